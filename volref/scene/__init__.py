@@ -1,0 +1,9 @@
+"""The scene model: frozen records that check themselves when built."""
+
+from volref.scene.camera import Camera
+from volref.scene.mesh import Mesh
+from volref.scene.scene import Scene
+from volref.scene.transfer import TransferFunction
+from volref.scene.volume import Volume
+
+__all__ = ["Camera", "Mesh", "Scene", "TransferFunction", "Volume"]

@@ -1,0 +1,212 @@
+"""Transfer functions: from the value of the field to colour and extinction.
+
+Colours are straight (emitted, not weighted) and in the working space.  Between knots the colour is linear
+in the value, and so is either the extinction or the opacity, whichever was given.  Beyond the outer knots
+the outer ones hold.  Two knots at one value are a jump: values below take the first, the value itself
+and those above the second.
+
+A lookup table of n texels over a domain from a to b has its entries at (texel-centre rule, n = 4):
+
+    |--0--|--1--|--2--|--3--|      entry i at a + (b - a) (i + 1/2) / n, clamped beyond the outer centres
+    a                       b
+
+so over 0..8 they lie at 1, 3, 5, 7; without texel centres, at a + (b - a) i / (n - 1): 0, 2.67, 5.33, 8.
+"""
+
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from volref.arrays import Floats, ShapeRule, float_array, number, one_of, set_fields
+from volref.errors import SceneError
+
+INTERPOLATIONS = ("extinction", "opacity")
+
+
+@dataclass(frozen=True, eq=False, init=False)
+class TransferFunction:
+    """A piecewise linear map from value to colour and to extinction or opacity.
+
+    Parameters
+    ----------
+    values
+        Positions of the knots (K,), non-decreasing, in the units of the volume's values.
+    colors
+        Straight colours (K, 3), at least 0.
+    extinction
+        Extinction at the knots (K,) per world unit, at least 0.  Exactly one of `extinction` and `opacity`
+        is given; that one is interpolated.
+    opacity
+        Opacity at the knots (K,) in 0..1 of a layer `unit_distance` thick.  Between knots
+        extinction = -log1p(-opacity) / unit_distance; an opacity of 1 ends a ray.
+    unit_distance
+        The world length for which `opacity` is meant.
+
+    Raises
+    ------
+    SceneError
+        If a field breaks one of these rules.
+
+    Examples
+    --------
+    >>> tf = TransferFunction([0, 10], [(0, 0, 0), (1, 1, 1)], [0.0, 2.0])
+    >>> tf.interpolation, tf.opacity is None
+    ('extinction', True)
+    """
+
+    values: Floats
+    colors: Floats
+    extinction: Floats | None
+    opacity: Floats | None
+    unit_distance: float
+
+    def __init__(
+        self,
+        values: ArrayLike,
+        colors: ArrayLike,
+        extinction: ArrayLike | None = None,
+        opacity: ArrayLike | None = None,
+        unit_distance: float = 1.0,
+    ) -> None:
+        if (extinction is None) == (opacity is None):
+            given = "neither" if extinction is None else "both"
+            message = f"transfer must have one of extinction and opacity, got {given}; "
+            raise SceneError(message + "give the one that is linear between the knots")
+        knots = _checked_positions(values)
+        count = (len(knots),)
+        set_fields(
+            self,
+            values=knots,
+            colors=_at_least_zero("transfer.colors", colors, (*count, 3)),
+            extinction=None
+            if extinction is None
+            else _at_least_zero("transfer.extinction", extinction, count),
+            opacity=None if opacity is None else _checked_opacity(opacity, count),
+            unit_distance=number("transfer.unit_distance", unit_distance, above=0),
+        )
+
+    @classmethod
+    def from_opacity(
+        cls,
+        values: ArrayLike,
+        colors: ArrayLike,
+        opacity: ArrayLike,
+        unit_distance: float = 1.0,
+        *,
+        interpolation: str = "opacity",
+    ) -> Self:
+        """Transfer function of opacities, as GPU tables hold them.
+
+        `interpolation="opacity"` keeps the opacity linear between knots; "extinction" takes the extinction
+        -log1p(-opacity) / unit_distance at the knots and keeps that linear, and refuses opacity 1.
+
+        Examples
+        --------
+        >>> colors = [(1, 1, 1)] * 2
+        >>> tf = TransferFunction.from_opacity([0, 1], colors, [0, 0.5], 2.0, interpolation="extinction")
+        >>> (tf.extinction * 2.0 / np.log(2.0)).tolist()
+        [0.0, 1.0]
+        """
+        one_of("interpolation", interpolation, INTERPOLATIONS)
+        if interpolation == "opacity":
+            return cls(values, colors, opacity=opacity, unit_distance=unit_distance)
+        alpha = _checked_opacity(opacity, ("K",))
+        if (alpha == 1).any():
+            message = "transfer.opacity must stay below 1 where extinction is interpolated, got 1 at index "
+            message += f"{int(np.argmax(alpha == 1))}; lower it or use interpolation='opacity'"
+            raise SceneError(message)
+        length = number("transfer.unit_distance", unit_distance, above=0)
+        extinction = -np.log1p(-alpha) / length
+        return cls(values, colors, extinction, unit_distance=length)
+
+    @classmethod
+    def from_lut(
+        cls,
+        rgba: ArrayLike,
+        domain: tuple[float, float],
+        unit_distance: float = 1.0,
+        *,
+        texel_centers: bool = True,
+        interpolation: str = "opacity",
+    ) -> Self:
+        """Transfer function of a lookup table (n, 4) with straight colours, spread over `domain`.
+
+        Integer tables are codes and are divided by their type's largest value (255 for uint8).
+        `texel_centers=True` places entry i at (i + 1/2) / n of the domain, as a texture lookup at
+        (value - a) / (b - a) does; False places it at i / (n - 1).
+
+        Examples
+        --------
+        >>> table = np.zeros((4, 4))
+        >>> TransferFunction.from_lut(table, (0, 8)).values.tolist()
+        [1.0, 3.0, 5.0, 7.0]
+        """
+        table = np.asarray(rgba)
+        if table.dtype.kind in "iu":
+            table = table / np.iinfo(table.dtype).max
+        table = float_array("transfer.rgba", table, ("n", 4))
+        ends = float_array("transfer.domain", domain, (2,))
+        if not ends[0] < ends[1]:
+            message = f"transfer.domain must rise, got {ends.tolist()}; swap or move its ends"
+            raise SceneError(message)
+        count = len(table)
+        if count < (1 if texel_centers else 2):
+            message = f"transfer.rgba must have more entries, got {count}; give at least 2"
+            raise SceneError(message)
+        index = np.arange(count)
+        place = (index + 0.5) / count if texel_centers else index / (count - 1)
+        values = ends[0] + (ends[1] - ends[0]) * place
+        return cls.from_opacity(values, table[:, :3], table[:, 3], unit_distance, interpolation=interpolation)
+
+    @property
+    def interpolation(self) -> str:
+        """What is linear between knots: "extinction" or "opacity"."""
+        return "extinction" if self.extinction is not None else "opacity"
+
+    @property
+    def knot_extinction(self) -> Floats:
+        """Extinction at the knots (K,) per world unit, infinite where the opacity is 1."""
+        if self.extinction is not None:
+            return self.extinction
+        assert self.opacity is not None
+        with np.errstate(divide="ignore"):
+            return np.asarray(-np.log1p(-self.opacity) / self.unit_distance)
+
+
+def _checked_positions(values: ArrayLike) -> Floats:
+    array = float_array("transfer.values", values, ("K",))
+    if len(array) == 0:
+        message = "transfer.values must have at least one knot, got none; give one"
+        raise SceneError(message)
+    falls = np.flatnonzero(np.diff(array) < 0)
+    if len(falls):
+        i = int(falls[0]) + 1
+        message = f"transfer.values must not decrease, got {array[i]:g} after {array[i - 1]:g} at index {i}; "
+        raise SceneError(message + "sort the table")
+    triples = np.flatnonzero(array[2:] == array[:-2])
+    if len(triples):
+        i = int(triples[0])
+        message = f"transfer.values must hold a value at most twice, got {array[i]:g} at indices "
+        raise SceneError(message + f"{i} to {i + 2}; keep the first and the last")
+    return array
+
+
+def _at_least_zero(name: str, value: ArrayLike, shape: ShapeRule) -> Floats:
+    array = float_array(name, value, shape)
+    if (array < 0).any():
+        where = tuple(int(i) for i in np.argwhere(array < 0)[0])
+        index = where[0] if len(where) == 1 else where
+        message = f"{name} must be at least 0, got {array[where]:g} at index {index}; "
+        raise SceneError(message + "raise it to 0")
+    return array
+
+
+def _checked_opacity(opacity: ArrayLike, shape: ShapeRule) -> Floats:
+    array = _at_least_zero("transfer.opacity", opacity, shape)
+    if (array > 1).any():
+        i = int(np.argmax(array > 1))
+        message = f"transfer.opacity must lie in 0..1, got {array[i]:g} at index {i}; "
+        raise SceneError(message + "divide by the largest code, or give extinction instead")
+    return array

@@ -1,0 +1,184 @@
+"""A scalar field on a regular grid, placed in the world.
+
+Half a voxel decides where a volume ends.  Four samples along x, spacing s, origin o at sample 0:
+
+    cell:  |--0--|--1--|--2--|--3--|     index -0.5 to 3.5, clamped beyond the outer centres
+    node:     0-----1-----2-----3        index  0.0 to 3.0
+
+so with o = 0 and s = 2 a "cell" volume reaches from x = -1 to 7 and a "node" volume from 0 to 6.
+A GPU texture is "cell": texture coordinate u = (index + 1/2) / n, 0 at index -0.5 and 1 at index 3.5.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from volref.arrays import Floats, Numbers, Vector, float_array, number, one_of, set_fields
+from volref.errors import SceneError
+from volref.scene.transform import affine, check_regular, invert_affine
+
+# Above 2^53 neighbouring whole numbers are no longer distinct in float64.
+LARGEST_EXACT_INTEGER = 2**53
+
+IDENTITY = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+
+
+@dataclass(frozen=True, eq=False, init=False)
+class Volume:
+    """A trilinearly interpolated scalar field given at grid points.
+
+    Parameters
+    ----------
+    values
+        Array (nz, ny, nx) of any integer or real type, in raw units (HU, dBZ, codes).  Kept as it is,
+        without a copy, so a memory-mapped file stays one.
+    spacing
+        World distance (sx, sy, sz) between neighbouring samples.
+    origin
+        World position (x, y, z) of the centre of voxel (0, 0, 0), as in NRRD, NIfTI and ITK.
+    direction
+        3x3 matrix; column k is the unit vector along which index k grows.
+    centering
+        "cell": the extent reaches half a voxel beyond the outer samples and is clamped there, as in a
+        GPU texture.  "node": the extent ends at the outer samples, as in VTK point data.
+    nan
+        "refuse", or the finite value that replaces NaN and infinity (in a copy).
+
+    Raises
+    ------
+    SceneError
+        If a field breaks one of these rules.
+
+    Examples
+    --------
+    >>> volume = Volume(np.zeros((2, 3, 4), np.uint8), spacing=(2, 1, 1))
+    >>> volume.size, volume.index_bounds[0].tolist(), volume.index_bounds[1].tolist()
+    ((4, 3, 2), [-0.5, -0.5, -0.5], [3.5, 2.5, 1.5])
+    """
+
+    values: Numbers
+    spacing: Vector
+    origin: Vector
+    direction: Floats
+    centering: str
+
+    def __init__(
+        self,
+        values: Numbers,
+        spacing: ArrayLike = (1.0, 1.0, 1.0),
+        origin: ArrayLike = (0.0, 0.0, 0.0),
+        direction: ArrayLike = IDENTITY,
+        centering: str = "cell",
+        *,
+        nan: str | float = "refuse",
+    ) -> None:
+        one_of("volume.centering", centering, ("cell", "node"))
+        set_fields(
+            self,
+            values=_checked_values(values, centering, nan),
+            spacing=_positive_spacing(spacing),
+            origin=tuple(float_array("volume.origin", origin, (3,)).tolist()),
+            direction=_unit_columns(direction),
+            centering=centering,
+        )
+
+    @property
+    def size(self) -> tuple[int, int, int]:
+        """Number of samples (nx, ny, nz)."""
+        nz, ny, nx = self.values.shape
+        return nx, ny, nz
+
+    @cached_property
+    def world_from_index(self) -> Floats:
+        """4x4 matrix from index space (integer = voxel centre) to the world."""
+        return affine(self.direction * np.array(self.spacing), np.array(self.origin))
+
+    @cached_property
+    def index_from_world(self) -> Floats:
+        """4x4 matrix from the world to index space."""
+        return invert_affine("volume.direction", self.world_from_index)
+
+    @cached_property
+    def index_bounds(self) -> tuple[Floats, Floats]:
+        """Lowest and highest index point (x, y, z) of the extent."""
+        margin = 0.5 if self.centering == "cell" else 0.0
+        return np.full(3, -margin), np.array(self.size, dtype=np.float64) - 1.0 + margin
+
+    @cached_property
+    def corners(self) -> Floats:
+        """The eight world corners of the extent, (8, 3)."""
+        low, high = self.index_bounds
+        choice = np.array(np.meshgrid([0, 1], [0, 1], [0, 1], indexing="ij")).reshape(3, 8).T
+        index = np.where(choice == 1, high, low)
+        return index @ self.world_from_index[:3, :3].T + self.world_from_index[:3, 3]
+
+    @cached_property
+    def value_bounds(self) -> tuple[float, float]:
+        """Least and greatest value; every interpolated value lies between them."""
+        return float(self.values.min()), float(self.values.max())
+
+
+def _positive_spacing(spacing: ArrayLike) -> Vector:
+    array = float_array("volume.spacing", spacing, (3,))
+    if not (array > 0).all():
+        message = f"volume.spacing must be positive, got {array.tolist()}; "
+        raise SceneError(message + "give the distance between samples and flip an axis by volume.direction")
+    return tuple(array.tolist())
+
+
+def _unit_columns(direction: ArrayLike) -> Floats:
+    array = float_array("volume.direction", direction, (3, 3))
+    check_regular("volume.direction", array)
+    lengths = np.linalg.norm(array, axis=0)
+    # 1e-4: readers hand on float32 headers, printed with five digits in some formats.
+    if not np.allclose(lengths, 1.0, rtol=0.0, atol=1e-4):
+        message = f"volume.direction must have columns of length 1, got lengths {lengths.tolist()}; "
+        raise SceneError(message + "move the lengths into volume.spacing")
+    return array
+
+
+def _checked_values(values: Numbers, centering: str, nan: str | float) -> Numbers:
+    array = np.asanyarray(values)
+    least = 2 if centering == "node" else 1
+    if array.ndim != 3 or min(array.shape) < least:
+        message = f"volume.values must have shape (nz, ny, nx), each at least {least} for {centering!r} "
+        message += f"centering, got {array.shape}; "
+        raise SceneError(message + "select one scalar 3-D field, z first")
+    if array.dtype.kind not in "iuf":
+        message = f"volume.values must be integers or real numbers, got {array.dtype}; "
+        raise SceneError(message + "convert them, for labels and masks to uint8 or float32")
+    if array.dtype.itemsize > 8:
+        message = f"volume.values must have at most 8 bytes each, got {array.dtype}; "
+        raise SceneError(message + "convert them to float64")
+    if not array.dtype.isnative:
+        array = array.astype(array.dtype.newbyteorder("="))
+    array = _finite_values(array, nan) if array.dtype.kind == "f" else array
+    _refuse_large(array)
+    view = array.view(np.ndarray)
+    view.flags.writeable = False
+    return view
+
+
+def _finite_values(array: Numbers, nan: str | float) -> Numbers:
+    if all(np.isfinite(layer).all() for layer in array):
+        return array
+    finite = np.isfinite(array)
+    if nan == "refuse":
+        where = tuple(int(i) for i in np.argwhere(~finite)[0])
+        message = f"volume.values must be finite, got {array[where]} at (z, y, x) = {where} "
+        message += f"and {int((~finite).sum())} such voxels; "
+        raise SceneError(message + "pass nan=VALUE to replace them")
+    return np.where(finite, array, array.dtype.type(number("volume.nan", nan)))
+
+
+def _refuse_large(array: Numbers) -> None:
+    if array.dtype.itemsize < 8:
+        return
+    largest = max(abs(float(array.min())), abs(float(array.max())))
+    # The interpolation takes differences: 1e300 keeps them finite.
+    limit = LARGEST_EXACT_INTEGER if array.dtype.kind in "iu" else 1e300
+    if largest > limit:
+        message = f"volume.values must lie within {limit:g} of 0, got {largest:g}; "
+        raise SceneError(message + "rescale them")
