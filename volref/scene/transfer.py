@@ -19,7 +19,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from volref.arrays import Floats, ShapeRule, float_array, number, one_of, set_fields
+from volref.arrays import Booleans, Floats, ShapeRule, float_array, number, one_of, set_fields
 from volref.errors import SceneError
 
 INTERPOLATIONS = ("extinction", "opacity")
@@ -173,6 +173,27 @@ class TransferFunction:
         assert self.opacity is not None
         with np.errstate(divide="ignore"):
             return np.asarray(-np.log1p(-self.opacity) / self.unit_distance)
+
+    def is_visible(self, low: ArrayLike, high: ArrayLike) -> Booleans:
+        """Tell for each range of values from `low` to `high` whether anything in it has an opacity above 0.
+
+        Examples
+        --------
+        >>> transfer = TransferFunction([0, 1, 2, 3], np.ones((4, 3)), [0, 0, 5, 5])
+        >>> transfer.is_visible([0.0, 0.0, 1.5, 4.0], [1.0, 1.01, 1.6, 4.0]).tolist()
+        [False, True, True, True]
+        """
+        seen = np.asarray(self.opacity if self.extinction is None else self.extinction) > 0
+        knots, high = self.values, np.asarray(high)
+        seen_before = np.concatenate([[0], np.cumsum(seen)])
+        first = np.searchsorted(knots, low, side="left")
+        last = np.searchsorted(knots, high, side="right")
+        seen_knot_inside = seen_before[last] > seen_before[first]
+        # A piece that reaches into the range from a knot outside is seen where that knot is.
+        seen_from_below = (first > 0) & seen[first - 1]
+        reaches_above = (last < len(knots)) & ((last == 0) | (high > knots[last - 1]))
+        seen_from_above = reaches_above & seen[np.minimum(last, len(knots) - 1)]
+        return np.asarray(seen_knot_inside | seen_from_below | seen_from_above)
 
 
 def _checked_positions(values: ArrayLike) -> Floats:

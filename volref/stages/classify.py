@@ -1,0 +1,156 @@
+"""Stage 4: from the value of the field to colour and opacity.
+
+n samples; values, opacities and lengths are (n,), colours (3, n).
+
+A transfer function is piecewise linear.  To find the piece of a value without a search, its range is cut
+into equal buckets, so narrow that none holds more than one knot; a bucket then has two pieces, below and
+from its knot on:
+
+    knots         |    |              |    |         each bucket: at most one |
+    buckets    [    ][    ][    ][    ][    ]
+    entries     0 1   2 3   4 5   6 7   8 9          entry = 2 bucket + (value >= knot)
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from volref.arrays import Booleans, Floats, Indices
+from volref.scene.transfer import TransferFunction
+from volref.workspace import Workspace
+
+# Two buckets per narrowest gap up to this many; a narrower gap is searched for instead.
+MOST_BUCKETS = 1 << 16
+
+
+@dataclass(frozen=True, eq=False)
+class Table:
+    """A transfer function laid out for lookup, for values in a known range.
+
+    Entry e stands for one linear piece: channel c is `base[c, e] + slope[c, e] (value - start[e])`, with
+    red, green, blue and, as the fourth, extinction or opacity (`interpolation`).  `knots` holds the knot
+    of each bucket, or, where buckets would be too many (`scale` is None), all distinct knots.
+    """
+
+    interpolation: str
+    unit_distance: float
+    low: float
+    scale: float | None
+    knots: Floats
+    start: Floats
+    base: Floats
+    slope: Floats
+
+
+def lookup_table(transfer: TransferFunction, value_bounds: tuple[float, float]) -> Table:
+    """Return the table of `transfer` for values within `value_bounds`, whose ends may be off by rounding."""
+    strength = transfer.opacity if transfer.extinction is None else transfer.extinction
+    channels = np.concatenate([transfer.colors.T, np.asarray(strength)[None]])
+    knots, start, base, slope = _pieces(transfer.values, channels)
+    low, high = value_bounds
+    # The nearest knot on each side of the range counts too: it may share a bucket with one inside.
+    near = knots[max(np.searchsorted(knots, low) - 1, 0) : np.searchsorted(knots, high, side="right") + 1]
+    gap = float(np.diff(near).min()) if len(near) > 1 else max(high - low, 1.0)
+    buckets = int(min(np.ceil(2 * (high - low) / gap) + 1, MOST_BUCKETS + 1))
+    if buckets > MOST_BUCKETS:
+        return Table(transfer.interpolation, transfer.unit_distance, low, None, knots, start, base, slope)
+    # One bucket more on each side takes the values that rounding put outside the bounds.
+    width = (high - low) / buckets if high > low else gap / 2
+    edges = low + width * np.arange(-1, buckets + 2)
+    below = np.searchsorted(knots, edges[:-1] - width / 4, side="right")
+    has_knot = below < len(knots)
+    knot = np.where(has_knot, knots[np.minimum(below, len(knots) - 1)], np.inf)
+    knot = np.where(knot <= edges[1:] + width / 4, knot, np.inf)
+    entry = np.stack([below, np.where(np.isfinite(knot), below + 1, below)], axis=1).ravel()
+    return Table(
+        transfer.interpolation,
+        transfer.unit_distance,
+        edges[0],
+        1.0 / width,
+        knot,
+        start[entry],
+        np.ascontiguousarray(base[:, entry]),
+        np.ascontiguousarray(slope[:, entry]),
+    )
+
+
+def _pieces(values: Floats, channels: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+    """Return the distinct knots (K,) and start, base, slope of the K + 1 pieces between and beyond them."""
+    knots, first = np.unique(values, return_index=True)
+    last = np.append(first[1:], len(values)) - 1  # at a jump the later knot holds from the value on
+    at_knot = channels[:, last]
+    before_next = channels[:, np.append(first[1:], len(values) - 1)]
+    gap = np.append(np.diff(knots), 1.0)
+    slope = (before_next - at_knot) / gap
+    slope[:, -1] = 0.0
+    start = np.concatenate([knots[:1], knots])
+    base = np.concatenate([channels[:, :1], at_knot], axis=1)
+    slope = np.concatenate([np.zeros((len(channels), 1)), slope], axis=1)
+    return knots, start, base, slope
+
+
+def classify(table: Table, values: Floats, work: Workspace) -> tuple[Floats, Floats]:
+    """Return the straight colours (3, n) and the extinction or opacity (n,) of values.
+
+    At a knot they are the knot's own numbers, exactly.  The result lies in `work` until the next call.
+    """
+    n = len(values)
+    entry = _entries(table, values, work)
+    offset = work.get("offset", n)
+    np.take(table.start, entry, out=offset, mode="wrap")
+    np.subtract(values, offset, out=offset)
+    result: Floats = work.get("classified", 4 * n).reshape(4, n)
+    base = work.get("channel base", n)
+    for channel, out in enumerate(result):
+        np.take(table.slope[channel], entry, out=out, mode="wrap")
+        np.multiply(out, offset, out=out)
+        np.take(table.base[channel], entry, out=base, mode="wrap")
+        np.add(out, base, out=out)
+    return result[:3], result[3]
+
+
+def _entries(table: Table, values: Floats, work: Workspace) -> Indices:
+    if table.scale is None:
+        return np.searchsorted(table.knots, values, side="right")
+    n = len(values)
+    place = work.get("place", n)
+    np.subtract(values, table.low, out=place)
+    np.multiply(place, table.scale, out=place)
+    entry: Indices = work.get("entry", n, np.intp)
+    narrow = work.get("narrow entry", n, np.int32)  # float64 to int32 to int64 is faster than directly
+    np.copyto(narrow, place, casting="unsafe")
+    np.copyto(entry, narrow)
+    np.take(table.knots, entry, out=place, mode="wrap")
+    from_knot: Booleans = work.get("from knot", n, np.bool_)
+    np.greater_equal(values, place, out=from_knot)
+    np.add(entry, entry, out=entry)
+    np.add(entry, from_knot, out=entry)
+    return entry
+
+
+def segment_opacity(table: Table, strength: Floats, length: float | Floats) -> Floats:
+    """Overwrite `strength`, the extinction or opacity of samples, with the opacity of their segments.
+
+    The extinction of a segment of `length` l is taken as constant: opacity = 1 - e^(-extinction l) from
+    extinction, and 1 - (1 - opacity)^(l / unit_distance) from the opacity of a unit distance.  Both are
+    evaluated as -expm1(...), which keeps faint opacities exact (1 - e^-x has lost all digits at 1e-17);
+    an opacity of 1 stays 1.  Half the unit distance, the usual step, needs only a root:
+    1 - sqrt(1 - a) = a / (1 + sqrt(1 - a)).
+    """
+    if table.interpolation == "extinction":
+        np.multiply(strength, length, out=strength)
+        np.negative(strength, out=strength)
+    else:
+        ratio = np.asarray(length) / table.unit_distance
+        if ratio.ndim == 0 and ratio == 1.0:
+            return strength
+        if ratio.ndim == 0 and ratio == 0.5:
+            root = np.sqrt(1.0 - strength)
+            root += 1.0
+            return np.divide(strength, root, out=strength)
+        np.negative(strength, out=strength)
+        with np.errstate(divide="ignore"):
+            np.log1p(strength, out=strength)
+        np.multiply(strength, ratio, out=strength)
+    np.expm1(strength, out=strength)
+    return np.negative(strength, out=strength)

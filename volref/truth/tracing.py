@@ -1,0 +1,202 @@
+"""`trace`: every number of one ray.
+
+The same stages as the marcher's, run on a single ray with nothing left out, so that a table row says what
+the marcher saw.  Sums are taken one by one, so the colour differs from the marcher's by rounding only.
+"""
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from volref import planning
+from volref.arrays import Floats, Numbers, whole_number
+from volref.errors import SceneError
+from volref.planning import Plan
+from volref.records import Rays, Surface
+from volref.scene.scene import Scene
+from volref.scene.transform import transform_directions, transform_points
+from volref.stages.classify import classify, segment_opacity
+from volref.stages.rays import pixel_rays
+from volref.stages.sampling import PAD, trilinear
+from volref.stages.spans import box_spans, cut_at_surface
+from volref.truth.march import Field, field_of, segment_counts
+from volref.truth.rendering import light_behind
+from volref.truth.surfaces import visible_surface
+from volref.workspace import Workspace
+
+# name: (columns, meaning); what a row of the table holds.
+COLUMNS: dict[str, tuple[int, str]] = {
+    "segment": (1, "number of the segment, from 0"),
+    "t_start": (1, "world distance at which it starts"),
+    "t_end": (1, "world distance at which it ends"),
+    "t": (1, "world distance of the sample, its middle"),
+    "position": (3, "world position of the sample"),
+    "index": (3, "the same in index space (integer = voxel centre)"),
+    "cell": (3, "lowest corner of the cell, in index space"),
+    "fraction": (3, "place within the cell, 0..1"),
+    "corners": (8, "samples at the cell's corners, x fastest"),
+    "value": (1, "interpolated value"),
+    "color": (3, "straight colour of the transfer function"),
+    "strength": (1, "extinction or opacity of the transfer function, whichever it interpolates"),
+    "opacity": (1, "opacity of the segment"),
+    "transmittance": (1, "transmittance in front of the segment"),
+    "weight": (1, "opacity times transmittance"),
+    "accumulated": (4, "premultiplied RGBA up to and with the segment"),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Trace:
+    """One ray in full: `head` (camera ray, span, surface, result) and `table`, name to array (S, columns)."""
+
+    head: dict[str, Any]
+    table: dict[str, Numbers]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the trace as plain data for JSON; infinite distances as null."""
+        rows = {name: column.tolist() for name, column in self.table.items()}
+        return {**self.head, "columns": {name: COLUMNS[name][1] for name in rows}, "segments": rows}
+
+    def to_json(self) -> str:
+        """Return the trace as JSON text."""
+        return json.dumps(self.as_dict(), allow_nan=False)
+
+    def __str__(self) -> str:
+        """Return the trace as a table for people, the widest columns left to the JSON."""
+        lines = [f"{name}: {_words(value)}" for name, value in self.head.items()]
+        shown = [name for name in self.table if name not in ("cell", "fraction", "corners", "position")]
+        lines.append("  ".join(f"{name:>{12 * COLUMNS[name][0]}}" for name in shown))
+        for row in range(len(self.table["segment"])):
+            cells = [f"{number:12.6g}" for name in shown for number in np.atleast_1d(self.table[name][row])]
+            lines.append("".join(cells))
+        return "\n".join(lines)
+
+
+def trace(
+    scene: Scene, pixel: Sequence[int], *, step: float | None = None, plan: Plan | None = None
+) -> Trace:
+    """Return every number of the ray through `pixel` (x, y), row 0 at the top.
+
+    `step` and `plan` are as for `render`; early termination and empty space play no part.
+
+    Raises
+    ------
+    SceneError
+        If the pixel lies outside the image, or an argument breaks a rule of `volref.plan`.
+    """
+    x, y = _checked_pixel(scene, pixel)
+    decided = plan or planning.plan(scene, step=step)
+    flat = np.array([y * scene.width + x])
+    rays = pixel_rays(scene.camera, scene.width, scene.height, flat)
+    surface = visible_surface(scene) if scene.meshes else None
+    head: dict[str, Any] = {
+        "pixel": [x, y],
+        "origin": rays.origins[0].tolist(),
+        "direction": rays.directions[0].tolist(),
+        "step": decided.step,
+        "surface": _surface_words(surface, x, y),
+        "behind": light_behind(scene, surface, flat)[0].tolist(),
+    }
+    if scene.volume is None:
+        return Trace({**head, "span": None, "ended": "no volume", "rgba": head["behind"]}, {})
+    distance = np.inf if head["surface"] is None else head["surface"]["distance"]
+    return _trace_volume(scene, decided, rays, distance, head)
+
+
+def _surface_words(surface: Surface | None, x: int, y: int) -> dict[str, Any] | None:
+    if surface is None or surface.mesh[y, x] < 0:
+        return None
+    return {
+        "distance": float(surface.distance[y, x]),
+        "mesh": int(surface.mesh[y, x]),
+        "face": int(surface.face[y, x]),
+        "color": surface.color[y, x].tolist(),
+    }
+
+
+def _trace_volume(scene: Scene, plan: Plan, rays: Rays, distance: float, head: dict[str, Any]) -> Trace:
+    """Trace one ray through the volume of `scene` up to a surface `distance` away, +inf without one."""
+    field = field_of(scene)
+    origin = transform_points(field.index_from_world, rays.origins).T
+    direction = transform_directions(field.index_from_world, rays.directions).T
+    box = box_spans(origin, direction, field.low, field.high)
+    spans = cut_at_surface(box, np.array([distance]))
+    t_near, t_far = float(spans.t_near[0]), float(spans.t_far[0])
+    if t_near >= t_far:
+        missed = box.t_near[0] >= box.t_far[0]
+        ended = "the ray misses the volume" if missed else "a surface lies in front of the volume"
+        return Trace({**head, "span": None, "ended": ended, "rgba": head["behind"]}, {})
+    counts, last = segment_counts(spans, plan.step)
+    start = t_near + np.arange(counts[0]) * plan.step
+    length = np.append(np.full(len(start) - 1, plan.step), last)
+    table = _table(scene, field, start, length, origin, direction)
+    table["t_end"] = np.append(start[1:], t_far)
+    table["position"] = rays.origins[0] + table["t"][:, None] * rays.directions[0]
+    transmittance = table["transmittance"][-1] - table["weight"][-1]
+    rgba = table["accumulated"][-1] + transmittance * np.array(head["behind"])
+    met = "meets an opaque surface" if t_far == distance else "leaves the volume"
+    head = {**head, "span": [t_near, t_far], "ended": f"the ray {met}", "rgba": rgba.tolist()}
+    return Trace(head, {name: table[name] for name in COLUMNS})
+
+
+def _checked_pixel(scene: Scene, pixel: Sequence[int]) -> tuple[int, int]:
+    if len(pixel) != 2:
+        message = f"pixel must be two numbers x, y, got {pixel!r}; count from the top left, from 0"
+        raise SceneError(message)
+    x = whole_number("pixel x", pixel[0], low=0, high=scene.width - 1)
+    return x, whole_number("pixel y", pixel[1], low=0, high=scene.height - 1)
+
+
+def _table(
+    scene: Scene, field: Field, start: Floats, length: Floats, origin: Floats, direction: Floats
+) -> dict[str, Numbers]:
+    """Return the columns of the segments that begin at `start` (S,), but for `position` and `t_end`."""
+    assert scene.volume is not None
+    work = Workspace()
+    t = start + length / 2
+    index = origin + direction * t
+    cell = np.floor(index)
+    value = trilinear(field.grid, index + PAD, work)
+    color, strength = classify(field.table, value, work)
+    opacity = segment_opacity(field.table, strength.copy(), length)
+    transmittance = np.ones(len(t) + 1)
+    accumulated = np.zeros((len(t), 4))
+    for k in range(len(t)):
+        weight = transmittance[k] * opacity[k]
+        transmittance[k + 1] = transmittance[k] - weight
+        accumulated[k] = accumulated[k - 1] if k else 0.0
+        accumulated[k, :3] += weight * color[:, k]
+        accumulated[k, 3] = 1.0 - transmittance[k + 1]
+    return {
+        "segment": np.arange(len(t)),
+        "t_start": start,
+        "t": t,
+        "index": index.T,
+        "cell": cell.T.astype(np.int64),
+        "fraction": (index - cell).T,
+        "corners": _corner_samples(scene.volume.values, cell.T.astype(np.int64)),
+        "value": value.copy(),
+        "color": color.T.copy(),
+        "strength": strength.copy(),
+        "opacity": opacity,
+        "transmittance": transmittance[:-1],
+        "weight": transmittance[:-1] * opacity,
+        "accumulated": accumulated,
+    }
+
+
+def _corner_samples(values: Numbers, cell: Numbers) -> Floats:
+    """Return the samples (S, 8) at the corners of the cells (S, 3), clamped to the volume, x fastest."""
+    corner = np.array([(x, y, z) for z in (0, 1) for y in (0, 1) for x in (0, 1)])
+    limit = np.array(values.shape[::-1]) - 1
+    x, y, z = np.moveaxis(np.clip(cell[:, None] + corner, 0, limit), -1, 0)
+    return np.asarray(values[z, y, x], dtype=np.float64)
+
+
+def _words(value: object) -> str:
+    if isinstance(value, list):
+        return " ".join(f"{number:.6g}" for number in value)
+    return str(value)
