@@ -1,0 +1,1 @@
+"""Judging images: how far apart two of them are."""
