@@ -52,10 +52,11 @@ def lookup_table(transfer: TransferFunction, value_bounds: tuple[float, float]) 
     near = knots[max(np.searchsorted(knots, low) - 1, 0) : np.searchsorted(knots, high, side="right") + 1]
     gap = float(np.diff(near).min()) if len(near) > 1 else max(high - low, 1.0)
     buckets = int(min(np.ceil(2 * (high - low) / gap) + 1, MOST_BUCKETS + 1))
-    if buckets > MOST_BUCKETS:
+    width = (high - low) / buckets if high > low else gap / 2
+    # A bucket of a few ulp, or one with no finite inverse, could not tell its values apart.
+    if buckets > MOST_BUCKETS or width < max(16 * np.spacing(max(abs(low), abs(high))), 1e-300):
         return Table(transfer.interpolation, transfer.unit_distance, low, None, knots, start, base, slope)
     # One bucket more on each side takes the values that rounding put outside the bounds.
-    width = (high - low) / buckets if high > low else gap / 2
     edges = low + width * np.arange(-1, buckets + 2)
     below = np.searchsorted(knots, edges[:-1] - width / 4, side="right")
     has_knot = below < len(knots)
@@ -138,19 +139,17 @@ def segment_opacity(table: Table, strength: Floats, length: float | Floats) -> F
     1 - sqrt(1 - a) = a / (1 + sqrt(1 - a)).
     """
     if table.interpolation == "extinction":
-        np.multiply(strength, length, out=strength)
-        np.negative(strength, out=strength)
+        np.multiply(strength, np.negative(length), out=strength)
     else:
         ratio = np.asarray(length) / table.unit_distance
         if ratio.ndim == 0 and ratio == 1.0:
             return strength
         if ratio.ndim == 0 and ratio == 0.5:
-            root = np.sqrt(1.0 - strength)
-            root += 1.0
-            return np.divide(strength, root, out=strength)
-        np.negative(strength, out=strength)
+            return np.divide(strength, 1.0 + np.sqrt(1.0 - strength), out=strength)
+        np.multiply(strength, -1.0, out=strength)
         with np.errstate(divide="ignore"):
             np.log1p(strength, out=strength)
         np.multiply(strength, ratio, out=strength)
     np.expm1(strength, out=strength)
-    return np.negative(strength, out=strength)
+    # Not np.negative: on a view whose stride is 64 bytes NumPy 2.4.6 computes it wrongly in place.
+    return np.multiply(strength, -1.0, out=strength)

@@ -19,42 +19,47 @@ def composite_block(
     weight_k = T_k opacity_k and T_(k+1) = T_k - weight_k (Max 1995, eq. 8, with the product telescoped):
     the weights and the last transmittance then add up to 1 but for one rounding each.
     """
-    segments, rays = opacity.shape
-    weight: Floats = work.get("weight", segments * rays).reshape(segments, rays)
     for k, count in enumerate(counts):
-        np.multiply(transmittance[:count], opacity[k, :count], out=weight[k, :count])
-        np.subtract(transmittance[:count], weight[k, :count], out=transmittance[:count])
-        weight[k, count:] = 0.0
-    for channel in range(3):
-        color[channel] += np.einsum("sr,sr->r", weight, colors[channel])
+        weight = work.get("weight", count)
+        light = work.get("light", count)
+        np.multiply(transmittance[:count], opacity[k, :count], out=weight)
+        np.subtract(transmittance[:count], weight, out=transmittance[:count])
+        for channel in range(3):  # no einsum: it fuses all but the odd last rays, which then differ by an ulp
+            np.multiply(weight, colors[channel, k, :count], out=light)
+            np.add(color[channel, :count], light, out=color[channel, :count])
 
 
 def composite_block_coarse(
-    transmittance: Floats,
-    color: Floats,
-    opacity: Floats,
-    colors: Floats,
-    counts: Indices,
-    unshortened: Indices,
+    transmittance: Floats, color: Floats, opacity: Floats, colors: Floats, counts: Indices, lengths: Floats
 ) -> None:
     """Add the same block as if the step were three times as long.
 
-    Of three segments of one length the middle one's sample is the midpoint of their union, so the coarse
-    midpoint rule needs no sample of its own: its opacity is 1 - (1 - a)^3 = a (3 - 3 a + a^2).  Where the
-    ray ends within the three, or the last of them is shortened, they are taken one by one;
-    `unshortened[g]` rays have all three of group g at full length.
+    Of three whole segments the middle one's sample is the midpoint of their union, so the coarse midpoint
+    rule needs no sample of its own: its opacity is 1 - (1 - a)^3 = a (3 - 3 a + a^2).  The last one to
+    three segments of a ray, of which the last is shortened, are united as well and take the sample of
+    the second of three, or of the first of two or one.  `lengths` (R,) says how many segments of full
+    length each ray has from the start of the block on, the shortened one as its fraction.
     """
-    for group, full in enumerate(unshortened):
-        middle = 3 * group + 1
-        a = opacity[middle, :full]
-        weight = (a * a - 3 * a + 3) * a * transmittance[:full]
-        transmittance[:full] -= weight
-        color[:, :full] += weight * colors[:, middle, :full]
-        for k in range(3 * group, 3 * group + 3):
-            tail = slice(full, counts[k])
-            weight = transmittance[tail] * opacity[k, tail]
-            transmittance[tail] -= weight
-            color[:, tail] += weight * colors[:, k, tail]
+    for group in range(len(counts) // 3):
+        first = 3 * group
+        remaining = lengths - first
+        whole = int(np.searchsorted(-remaining, -3.0, side="left"))
+        a = opacity[first + 1, :whole]
+        _add(transmittance, color, slice(0, whole), (a * a - 3 * a + 3) * a, colors[:, first + 1])
+        bounds = (whole, int(counts[first + 2]), int(counts[first + 1]), int(counts[first]))
+        for k, sample in enumerate((first + 1, first, first)):
+            ending = slice(bounds[k], bounds[k + 1])
+            a = opacity[sample, ending]
+            if k < 2:  # the opacity is that of a whole segment
+                with np.errstate(divide="ignore"):
+                    a = -np.expm1(remaining[ending] * np.log1p(-a))
+            _add(transmittance, color, ending, a, colors[:, sample])
+
+
+def _add(transmittance: Floats, color: Floats, rays: slice, opacity: Floats, colors: Floats) -> None:
+    weight = transmittance[rays] * opacity
+    transmittance[rays] -= weight
+    color[:, rays] += weight * colors[:, rays]
 
 
 def over(color: Floats, transmittance: Floats, behind: Floats) -> Floats:

@@ -38,7 +38,7 @@ def box_spans(origins: Floats, directions: Floats, low: Floats, high: Floats) ->
         if parallel.any():
             inside = (o >= low[axis]) & (o <= high[axis])
             first = np.where(parallel, np.where(inside, -np.inf, np.inf), first)
-            second = np.where(parallel, np.where(inside, np.inf, -np.inf), second)
+            second = np.where(parallel, np.inf, second)  # both +inf: it enters only after everything
         np.maximum(t_near, np.minimum(first, second), out=t_near)
         np.minimum(t_far, np.maximum(first, second), out=t_far)
     return Spans(t_near, t_far)

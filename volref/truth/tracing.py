@@ -22,7 +22,7 @@ from volref.stages.classify import classify, segment_opacity
 from volref.stages.rays import pixel_rays
 from volref.stages.sampling import PAD, trilinear
 from volref.stages.spans import box_spans, cut_at_surface
-from volref.truth.march import Field, field_of, segment_counts
+from volref.truth.march import Field, field_of, segments_of
 from volref.truth.rendering import light_behind
 from volref.truth.surfaces import visible_surface
 from volref.workspace import Workspace
@@ -129,9 +129,9 @@ def _trace_volume(scene: Scene, plan: Plan, rays: Rays, distance: float, head: d
         missed = box.t_near[0] >= box.t_far[0]
         ended = "the ray misses the volume" if missed else "a surface lies in front of the volume"
         return Trace({**head, "span": None, "ended": ended, "rgba": head["behind"]}, {})
-    counts, last = segment_counts(spans, plan.step)
-    start = t_near + np.arange(counts[0]) * plan.step
-    length = np.append(np.full(len(start) - 1, plan.step), last)
+    counts, steps, last = segments_of(spans, plan.step)
+    start = t_near + np.arange(counts[0]) * steps[0]
+    length = np.append(np.full(len(start) - 1, steps[0]), last)
     table = _table(scene, field, start, length, origin, direction)
     table["t_end"] = np.append(start[1:], t_far)
     table["position"] = rays.origins[0] + table["t"][:, None] * rays.directions[0]
