@@ -1,0 +1,205 @@
+"""Meshes from files: positions exact, colours as numbers, transforms applied, transparency refused."""
+
+import json
+
+import numpy as np
+import pytest
+import trimesh
+from hypothesis import given
+from hypothesis import strategies as st
+from PIL import Image
+
+from volref.errors import FormatError, SceneError
+from volref.io import load_mesh, load_meshes, save_mesh
+from volref.scene import Mesh
+
+CORNERS = np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)], np.float64)
+FACES = np.array([(0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2)])
+CODES = np.array([(255, 0, 0, 255), (0, 128, 0, 255), (0, 0, 64, 255), (1, 2, 3, 255)], np.uint8)
+
+
+def tetrahedron(**options):
+    return trimesh.Trimesh(CORNERS, FACES, process=False, **options)
+
+
+@pytest.mark.parametrize("suffix", ["ply", "glb", "off", "obj", "stl", "gltf"])
+def test_positions_and_triangles_are_the_files(tmp_path, suffix):
+    path = tmp_path / f"a.{suffix}"
+    if suffix == "gltf":
+        for name, data in trimesh.exchange.gltf.export_gltf(tetrahedron().scene()).items():
+            (tmp_path / ("a.gltf" if name == "model.gltf" else name)).write_bytes(data)
+    else:
+        tetrahedron().export(path)
+    mesh = load_mesh(path)
+    assert np.array_equal(mesh.vertices[mesh.faces], CORNERS[FACES])  # exact: 0 and 1 in any format
+    assert mesh.coloring == "uniform"
+
+
+def test_vertex_colours_are_codes_over_255(tmp_path):
+    tetrahedron(vertex_colors=CODES).export(tmp_path / "a.ply")
+    mesh = load_mesh(tmp_path / "a.ply")
+    assert mesh.coloring == "vertex"
+    assert np.array_equal(mesh.colors, CODES[:, :3] / 255)
+
+
+def test_face_colours_belong_to_faces_where_counts_agree(tmp_path):
+    """A tetrahedron has 4 vertices and 4 faces, so the shape alone does not say."""
+    tetrahedron(face_colors=CODES).export(tmp_path / "a.ply")
+    mesh = load_mesh(tmp_path / "a.ply")
+    assert mesh.coloring == "face"
+    assert np.array_equal(mesh.colors, CODES[:, :3] / 255)
+
+
+@pytest.mark.parametrize("suffix", ["glb", "obj"])
+def test_textures_keep_row_0_at_the_top_and_v_upwards(tmp_path, suffix):
+    image = np.arange(24, dtype=np.uint8).reshape(2, 4, 3) * 10
+    uv = np.array([(0, 0), (1, 0), (0, 1), (0.25, 0.5)])
+    material = (
+        trimesh.visual.material.PBRMaterial(baseColorTexture=Image.fromarray(image))
+        if suffix == "glb"
+        else trimesh.visual.material.SimpleMaterial(Image.fromarray(image), diffuse=(255, 255, 255, 255))
+    )
+    visual = trimesh.visual.TextureVisuals(uv, material)
+    tetrahedron(visual=visual).export(tmp_path / f"a.{suffix}")
+    mesh = load_mesh(tmp_path / f"a.{suffix}")
+    assert mesh.coloring == "texture"
+    assert np.array_equal(mesh.texture, image / 255)
+    # OBJ splits vertices; compare by corner.  glTF stores v downwards in float32: 1 - v is exact here.
+    assert np.array_equal(mesh.uv[mesh.faces], uv[FACES])
+
+
+def test_a_texture_with_a_tint_is_refused(tmp_path):
+    material = trimesh.visual.material.SimpleMaterial(Image.new("RGB", (2, 2)), diffuse=(128, 255, 255, 255))
+    tetrahedron(visual=trimesh.visual.TextureVisuals(CORNERS[:, :2], material)).export(tmp_path / "a.obj")
+    with pytest.raises(FormatError, match="must not tint its texture, got the factor"):
+        load_mesh(tmp_path / "a.obj")
+
+
+def test_a_material_without_a_texture_gives_its_colour(tmp_path):
+    (tmp_path / "a.mtl").write_text("newmtl red\nKd 1 0.2 0\n")
+    text = "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nusemtl red\nf 1/1 2/1 3/1\n"
+    (tmp_path / "a.obj").write_text(text)
+    mesh = load_mesh(tmp_path / "a.obj")
+    assert mesh.coloring == "uniform"
+    assert np.array_equal(mesh.colors, np.array([255, 51, 0]) / 255)
+
+
+def test_texture_coordinates_without_a_material_give_the_plain_grey():
+    mesh = load_mesh("tests/data/mesh_teapot_uv.obj")
+    assert (len(mesh.vertices), len(mesh.faces) + mesh.dropped) == (3417, 6400)
+    assert mesh.coloring == "uniform"
+    assert mesh.colors.tolist() == [0.8, 0.8, 0.8]
+
+
+@pytest.mark.parametrize("what", ["vertex", "texture", "material"])
+def test_transparency_is_refused_with_a_sentence(tmp_path, what):
+    codes = CODES.copy()
+    codes[2, 3] = 254
+    if what == "vertex":
+        mesh = tetrahedron(vertex_colors=codes)
+    else:
+        clear = Image.fromarray(codes.reshape(2, 2, 4)) if what == "texture" else None
+        factor = None if what == "texture" else (1.0, 1.0, 1.0, 0.5)
+        material = trimesh.visual.material.PBRMaterial(baseColorTexture=clear, baseColorFactor=factor)
+        mesh = tetrahedron(visual=trimesh.visual.TextureVisuals(CORNERS[:, :2], material))
+    mesh.export(tmp_path / "a.glb")
+    with pytest.raises(FormatError, match="must be opaque, got an alpha of"):
+        load_mesh(tmp_path / "a.glb")
+
+
+def test_the_scene_graph_places_each_copy_of_a_mesh(tmp_path):
+    scene = trimesh.Scene()
+    moves = [np.diag([2.0, 1, 1, 1]), trimesh.transformations.translation_matrix([5, 6, 7])]
+    for i, matrix in enumerate(moves):
+        scene.add_geometry(tetrahedron(), node_name=f"node{i}", geom_name="tetra", transform=matrix)
+    scene.export(tmp_path / "a.glb")
+    meshes = load_meshes(tmp_path / "a.glb")
+    for matrix, mesh in zip(moves, meshes, strict=True):
+        assert np.array_equal(
+            mesh.vertices, CORNERS @ matrix[:3, :3].T + matrix[:3, 3]
+        )  # small whole numbers
+    with pytest.raises(FormatError, match="got 2; use load_meshes"):
+        load_mesh(tmp_path / "a.glb")
+
+
+def test_the_files_vertices_are_kept_unless_asked_to_merge(tmp_path):
+    tetrahedron().export(tmp_path / "a.stl")
+    assert len(load_mesh(tmp_path / "a.stl").vertices) == 12
+    assert len(load_mesh(tmp_path / "a.stl", process=True).vertices) == 4
+
+
+def test_degenerate_triangles_are_dropped_and_counted(tmp_path):
+    (tmp_path / "a.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 2 0 0\nf 1 2 3\nf 1 2 4\n")
+    mesh = load_mesh(tmp_path / "a.obj")
+    assert (len(mesh.faces), mesh.dropped) == (1, 1)
+
+
+@pytest.mark.parametrize("name", ["../secret.png", "none.png", "/etc/hostname"])
+def test_a_texture_that_is_missing_or_outside_the_meshs_folder_is_refused(tmp_path, name):
+    (tmp_path / "in").mkdir()
+    Image.new("RGB", (2, 2), (9, 9, 9)).save(tmp_path / "secret.png")
+    (tmp_path / "in" / "a.mtl").write_text(f"newmtl m\nKd 1 1 1\nmap_Kd {name}\n")
+    text = "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nusemtl m\nf 1/1 2/1 3/1\n"
+    (tmp_path / "in" / "a.obj").write_text(text)
+    with pytest.raises(
+        FormatError, match=r"must name files that lie in its folder, got '[^']*', which cannot"
+    ):
+        load_mesh(tmp_path / "in" / "a.obj")
+
+
+def test_a_material_file_that_is_missing_is_refused(tmp_path):
+    (tmp_path / "a.obj").write_text("mtllib none.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    with pytest.raises(FormatError, match=r"got 'none\.mtl', which cannot be read"):
+        load_mesh(tmp_path / "a.obj")
+
+
+def test_a_point_cloud_is_no_mesh(tmp_path):
+    trimesh.PointCloud(CORNERS).export(tmp_path / "a.ply")
+    with pytest.raises(FormatError, match=r"must hold triangles, got PointCloud"):
+        load_mesh(tmp_path / "a.ply")
+
+
+def test_the_nut_and_the_white_matter_load():
+    assert len(load_mesh("tests/data/mesh_nut.ply").faces) == 1046
+    assert len(load_mesh("tests/data/mesh_mni_white_matter.ply").faces) == 50010
+
+
+def test_a_gltf_that_asks_for_a_remote_buffer_is_refused(tmp_path):
+    document = {
+        "asset": {"version": "2.0"},
+        "buffers": [{"uri": "http://127.0.0.1:9/a.bin", "byteLength": 12}],
+        "bufferViews": [{"buffer": 0, "byteLength": 12}],
+        "accessors": [{"bufferView": 0, "componentType": 5126, "count": 1, "type": "VEC3"}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+        "nodes": [{"mesh": 0}],
+        "scenes": [{"nodes": [0]}],
+    }
+    (tmp_path / "a.gltf").write_text(json.dumps(document))
+    with pytest.raises(FormatError, match="must be a readable mesh file"):
+        load_mesh(tmp_path / "a.gltf")
+
+
+def random_mesh(seed, coloring):
+    rng = np.random.default_rng(seed)
+    vertices, faces = rng.normal(size=(6, 3)), rng.permutation(6).reshape(2, 3)
+    if coloring == "texture":
+        return Mesh(vertices, faces, uv=rng.normal(size=(6, 2)), texture=rng.random((2, 3, 3)), wrap="clamp")
+    count = {"uniform": (3,), "vertex": (6, 3), "face": (2, 3)}[coloring]
+    return Mesh(vertices, faces, rng.random(count))
+
+
+@given(st.integers(0, 2**32), st.sampled_from(["uniform", "vertex", "face", "texture"]))
+def test_npz_keeps_every_field_bit_for_bit(tmp_path_factory, seed, coloring):
+    mesh = random_mesh(seed, coloring)
+    path = tmp_path_factory.mktemp("mesh") / "a.npz"
+    save_mesh(mesh, path)
+    again = load_mesh(path)
+    for name in ("vertices", "faces", "colors", "uv", "texture"):
+        assert np.array_equal(getattr(again, name), getattr(mesh, name))
+    assert (again.wrap, again.coloring) == (mesh.wrap, mesh.coloring)
+
+
+def test_a_broken_npz_mesh_breaks_the_rules_of_mesh(tmp_path):
+    np.savez(tmp_path / "a.npz", vertices=CORNERS, faces=FACES + 1)
+    with pytest.raises(SceneError, match="indices that start at 1"):
+        load_mesh(tmp_path / "a.npz")

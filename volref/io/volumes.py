@@ -1,0 +1,184 @@
+"""Volumes from files: one door, by suffix.
+
+Every reader returns the samples (nz, ny, nx) and what the file says about their place; what the user states
+beside it (keyword arguments, then a JSON file called `<name>.json`, as in `head.raw.json`) comes first.
+"""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple, TypeAlias
+
+import numpy as np
+
+from volref.arrays import Numbers, whole_number
+from volref.errors import FormatError
+from volref.io.atlas import AtlasLayout, read_atlas
+from volref.io.guard import DEFAULT_MAX_BYTES, existing_file, nearest, one_line, read_json
+from volref.io.nifti import read_nifti
+from volref.io.npy import chosen_array, npz_headers, read_npy, read_npz
+from volref.io.nrrd import read_nrrd
+from volref.io.placement import GEOMETRY, SIGNS, placement_of_affine
+from volref.io.raw import read_raw
+from volref.scene.volume import Volume
+
+Statement: TypeAlias = dict[str, Any]
+Found: TypeAlias = tuple[Numbers, Statement]
+
+RAW_KEYS = ("size", "dtype", "byte_order", "skip", "spacing")
+ATLAS_NEEDED = ("tiles_across", "tiles_down", "slices")
+ATLAS_KEYS = (*ATLAS_NEEDED, "first_tile", "rows", "channel", "padding")
+# Names of matrices from (i, j, k) to the world in .npz files, with the space they lead to.
+AFFINES = {"affine_ijk_to_ras_mm": "ras", "affine_ijk_to_lps_mm": "lps"}
+
+
+def load_volume(
+    path: str | Path,
+    *,
+    nan: str | float = "refuse",
+    max_bytes: int = DEFAULT_MAX_BYTES,
+    **statement: object,
+) -> Volume:
+    """Volume in a file, by its suffix.
+
+    The world is that of NIfTI, x to the right, y to the front, z up (RAS+), in the file's own unit of
+    length; files in LPS or LAS are turned into it.
+
+    ======================  ==============================================================================
+    .npy                    an array (nz, ny, nx), memory-mapped
+    .npz                    array "volume" or the only one with 3 axes; "spacing" or "spacing_zyx",
+                            "origin", "direction", "centering", or "affine_ijk_to_ras_mm" / "..._lps_mm"
+    .nrrd .nhdr             NRRD (extra `nrrd`)
+    .nii .nii.gz            NIfTI (extra `nifti`)
+    .raw .bin               needs size, dtype, byte_order, skip and spacing, see `load_raw`
+    .png                    slice atlas, needs tiles_across, tiles_down and slices, see `volref.io.atlas`
+    ======================  ==============================================================================
+
+    Parameters
+    ----------
+    nan
+        "refuse", or the finite value that replaces NaN and infinity.
+    max_bytes
+        The most memory the samples may take; a file that would take more is refused before it is read.
+    statement
+        spacing, origin, direction, centering: in place of what the file says.  For .npz also `key`, the
+        name of the array; for RAW and atlases what the table names.  The same names may stand in a JSON
+        file beside the volume, called like it with `.json` added.
+
+    Raises
+    ------
+    FormatError
+        If the file is not what its suffix says, or the statement does not suit it.
+    SceneError
+        If the volume breaks a rule of `Volume`.
+    """
+    file = Path(path)
+    reader = _reader_of(file)
+    existing_file(file)
+    stated = {**_sidecar(file), **statement}
+    for name in stated:
+        if name not in (*GEOMETRY, *reader.keys):
+            message = f"{one_line(name)} must be something that a {reader.kind} file needs to be told, got "
+            message += f"{one_line(repr(stated[name]))} for {file.name}; "
+            raise FormatError(message + nearest(name, (*GEOMETRY, *reader.keys)))
+    missing = [name for name in reader.needed if name not in stated]
+    if missing:
+        message = (
+            f"{file.name} must be described by {', '.join(reader.needed)}, got no {', '.join(missing)}; "
+        )
+        raise FormatError(message + f"pass them or write them to {file.name}.json")
+    own = {name: stated[name] for name in reader.keys if name in stated}
+    limit = whole_number("max_bytes", max_bytes, low=1, high=2**62)
+    values, said = reader.read(file, own, limit)
+    placed = {**said, **{name: stated[name] for name in GEOMETRY if name in stated}}
+    return Volume(values, nan=nan, **placed)
+
+
+def is_volume_path(path: Path) -> bool:
+    """Say whether `load_volume` knows the suffix."""
+    return _suffix(path) in READERS
+
+
+def _sidecar(file: Path) -> Statement:
+    beside = file.with_name(file.name + ".json")
+    if not beside.is_file():
+        return {}
+    stated = read_json(beside)
+    if isinstance(stated, dict):
+        return stated
+    message = f"{beside.name} must hold a JSON object, got {type(stated).__name__}; write {{name: value}}"
+    raise FormatError(message)
+
+
+def _read_npy(file: Path, _: Statement, max_bytes: int) -> Found:
+    return read_npy(file, max_bytes), {}
+
+
+def _read_npz(file: Path, own: Statement, max_bytes: int) -> Found:
+    name = chosen_array(file, npz_headers(file), own.get("key"), "volume", 3)
+    values = read_npz(file, (name,), max_bytes)[name]
+    said = read_npz(file, (*GEOMETRY, "spacing_zyx", *AFFINES), 2**20)
+    place: Statement = {key: said[key].tolist() for key in GEOMETRY if key in said}
+    if "spacing_zyx" in said and "spacing" not in place:
+        place["spacing"] = np.ravel(said["spacing_zyx"])[::-1].tolist()
+    for key, space in AFFINES.items():
+        if key in said:
+            affine = np.asarray(said[key])
+            if affine.shape != (4, 4) or affine.dtype.kind not in "iuf":
+                message = f"{file.name} must hold {key} as 4 x 4 numbers, got {affine.dtype} of shape "
+                raise FormatError(message + f"{affine.shape}; save a matrix from (i, j, k) to the world")
+            place.update(placement_of_affine(affine, SIGNS[space]))
+    return values, place
+
+
+def _read_nrrd(file: Path, _: Statement, max_bytes: int) -> Found:
+    return read_nrrd(file, max_bytes)
+
+
+def _read_nifti(file: Path, _: Statement, max_bytes: int) -> Found:
+    return read_nifti(file, max_bytes)
+
+
+def _read_raw(file: Path, own: Statement, max_bytes: int) -> Found:
+    return read_raw(file, own["size"], own["dtype"], own["byte_order"], own["skip"], max_bytes), {}
+
+
+def _read_atlas(file: Path, own: Statement, max_bytes: int) -> Found:
+    return read_atlas(file, AtlasLayout(**own), max_bytes), {}
+
+
+class _Reader(NamedTuple):
+    """A format: what to call it, what reads it, which statements it takes, and which it needs."""
+
+    kind: str
+    read: Callable[[Path, Statement, int], Found]
+    keys: tuple[str, ...] = ()
+    needed: tuple[str, ...] = ()
+
+
+_NRRD = _Reader("NRRD", _read_nrrd)
+_NIFTI = _Reader("NIfTI", _read_nifti)
+_RAW = _Reader("RAW", _read_raw, RAW_KEYS[:4], RAW_KEYS)
+
+READERS = {
+    ".npy": _Reader(".npy", _read_npy),
+    ".npz": _Reader(".npz", _read_npz, ("key",)),
+    ".nrrd": _NRRD,
+    ".nhdr": _NRRD,
+    ".nii": _NIFTI,
+    ".nii.gz": _NIFTI,
+    ".raw": _RAW,
+    ".bin": _RAW,
+    ".png": _Reader("PNG atlas", _read_atlas, ATLAS_KEYS, ATLAS_NEEDED),
+}
+
+
+def _suffix(path: Path) -> str:
+    return ".nii.gz" if path.name.lower().endswith(".nii.gz") else path.suffix.lower()
+
+
+def _reader_of(file: Path) -> _Reader:
+    reader = READERS.get(_suffix(file))
+    if reader is not None:
+        return reader
+    message = f"{one_line(file.name)} must end in {', '.join(READERS)}, got {file.suffix!r}; "
+    raise FormatError(message + "convert it to NRRD or NIfTI")
