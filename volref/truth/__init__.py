@@ -1,0 +1,1 @@
+"""The reference integrators: what is behind `render` and `trace`."""
