@@ -10,6 +10,25 @@ Images are float64 (height, width, 4), row 0 at the top, premultiplied.  Volumes
 """
 
 from volref.errors import FormatError, SceneError
+from volref.io import (
+    AtlasLayout,
+    convert_volume,
+    describe_file,
+    load_mesh,
+    load_meshes,
+    load_raw,
+    load_scene,
+    load_transfer,
+    load_volume,
+    read_image,
+    save_mesh,
+    save_scene,
+    save_transfer,
+    save_volume,
+    scene_schema,
+    write_image,
+)
+from volref.oracle.metrics import Comparison, compare
 from volref.planning import Plan, plan
 from volref.scene import Camera, Mesh, Scene, TransferFunction, Volume
 from volref.truth.rendering import render
@@ -19,7 +38,9 @@ from volref.truth.tracing import Trace, trace
 __version__ = "0.1.0"
 
 __all__ = [
+    "AtlasLayout",
     "Camera",
+    "Comparison",
     "FormatError",
     "Mesh",
     "Plan",
@@ -29,7 +50,23 @@ __all__ = [
     "Trace",
     "TransferFunction",
     "Volume",
+    "compare",
+    "convert_volume",
+    "describe_file",
+    "load_mesh",
+    "load_meshes",
+    "load_raw",
+    "load_scene",
+    "load_transfer",
+    "load_volume",
     "plan",
+    "read_image",
     "render",
+    "save_mesh",
+    "save_scene",
+    "save_transfer",
+    "save_volume",
+    "scene_schema",
     "trace",
+    "write_image",
 ]

@@ -219,8 +219,7 @@ def _empty_space(volume: Volume, transfer: TransferFunction, length: float) -> t
 
 def _early_termination(volume: Volume, transfer: TransferFunction) -> tuple[float, Stage]:
     name = "early termination"
-    with np.errstate(invalid="ignore"):
-        most = float(transfer.knot_extinction.max()) * _diagonal(volume)
+    most = transfer.most_extinction(*volume.value_bounds) * _diagonal(volume)
     if most < -math.log(TERMINATION):
         reason = f"the optical depth of a ray cannot exceed {most:.3g}"
         return 0.0, Stage(name, included=False, reason=reason)

@@ -255,7 +255,8 @@ def _planes_of(clip: Floats, clip_z: str) -> tuple[float, float]:
     """
     perspective = np.array_equal(clip[3], (0, 0, -1, 0))
     parallel = np.array_equal(clip[3], (0, 0, 0, 1))
-    plain_rows = not clip[2, :2].any() and clip[2, 2] != 0 and abs(np.linalg.det(clip[:2, :2])) > 0
+    depth_varies = clip[2, 3] != 0 if perspective else clip[2, 2] != 0
+    plain_rows = not clip[2, :2].any() and depth_varies and np.linalg.det(clip[:2, :2]) != 0
     if not (perspective or parallel) or not plain_rows or (perspective and clip[:2, 3].any()):
         message = "camera.clip_matrix must be a perspective projection with last row (0, 0, -1, 0) or a "
         message += f"parallel one with (0, 0, 0, 1), got rows {clip.tolist()}; "

@@ -13,6 +13,7 @@ A lookup table of n texels over a domain from a to b has its entries at (texel-c
 so over 0..8 they lie at 1, 3, 5, 7; without texel centres, at a + (b - a) i / (n - 1): 0, 2.67, 5.33, 8.
 """
 
+import math
 from dataclasses import dataclass
 from typing import Self
 
@@ -165,14 +166,20 @@ class TransferFunction:
         """What is linear between knots: "extinction" or "opacity"."""
         return "extinction" if self.extinction is not None else "opacity"
 
-    @property
-    def knot_extinction(self) -> Floats:
-        """Extinction at the knots (K,) per world unit, infinite where the opacity is 1."""
+    def most_extinction(self, low: float, high: float) -> float:
+        """Return the greatest extinction of any value from `low` to `high`, infinite where the opacity is 1.
+
+        Examples
+        --------
+        >>> TransferFunction([0, 2, 9], np.ones((3, 3)), [0, 4, 1]).most_extinction(0.0, 1.0)
+        2.0
+        """
+        strength = np.asarray(self.opacity if self.extinction is None else self.extinction)
+        inside = (self.values >= low) & (self.values <= high)
+        most = max(np.interp([low, high], self.values, strength).max(), *strength[inside], 0.0)
         if self.extinction is not None:
-            return self.extinction
-        assert self.opacity is not None
-        with np.errstate(divide="ignore"):
-            return np.asarray(-np.log1p(-self.opacity) / self.unit_distance)
+            return float(most)
+        return math.inf if most == 1 else -math.log1p(-most) / self.unit_distance
 
     def is_visible(self, low: ArrayLike, high: ArrayLike) -> Booleans:
         """Tell for each range of values from `low` to `high` whether anything in it has an opacity above 0.

@@ -1,0 +1,76 @@
+import numpy as np
+import pytest
+
+from volref import Camera, SceneError
+from volref.scene.camera import look_at_matrix
+
+PLACE = ((3, 1, 2), (0, 0.5, 0), (0.1, 1, 0))
+
+
+def project(camera, width, height, point):
+    clip = camera.clip_from_view(width, height) @ camera.view_from_world @ [*point, 1]
+    return clip[:3] / clip[3]
+
+
+def test_the_view_looks_along_minus_z_with_up_upwards():
+    view = look_at_matrix((0, 0, 5), (0, 0, 0), (0, 1, 0))
+    assert (view @ [0, 0, 0, 1]).tolist() == [0, 0, -5, 1]
+    assert (view @ [1, 2, 5, 1]).tolist() == [1, 2, 0, 1]
+
+
+def test_the_view_is_a_rotation_of_a_right_handed_world():
+    view = look_at_matrix(*PLACE)
+    np.testing.assert_allclose(view[:3, :3] @ view[:3, :3].T, np.eye(3), atol=1e-15)
+    assert np.linalg.det(view[:3, :3]) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(("clip_z", "least"), [("-1..1", -1.0), ("0..1", 0.0)])
+@pytest.mark.parametrize("build", [Camera.look_at, Camera.orthographic])
+def test_near_and_far_map_to_the_ends_of_the_clip_range(build, clip_z, least):
+    camera = build((0, 0, 0), (0, 0, -1), (0, 1, 0), 40.0, 0.5, 20.0, clip_z=clip_z)
+    assert project(camera, 3, 2, (0, 0, -0.5))[2] == pytest.approx(least, abs=1e-14)
+    assert project(camera, 3, 2, (0, 0, -20.0))[2] == pytest.approx(1.0, abs=1e-14)
+
+
+def test_fov_y_is_the_full_vertical_angle():
+    camera = Camera.look_at((0, 0, 0), (0, 0, -1), (0, 1, 0), 90.0, 0.1, 10.0)
+    assert project(camera, 200, 100, (0, 3, -3))[1] == pytest.approx(1.0)
+    assert project(camera, 200, 100, (6, 0, -3))[0] == pytest.approx(1.0)
+
+
+def test_the_orthographic_height_is_the_height_of_the_image():
+    camera = Camera.orthographic((0, 0, 0), (0, 0, -1), (0, 1, 0), 4.0, 0.1, 10.0)
+    assert project(camera, 200, 100, (4, 2, -3))[:2].tolist() == [1.0, 1.0]
+
+
+@pytest.mark.parametrize("clip_z", ["-1..1", "0..1"])
+@pytest.mark.parametrize("build", [Camera.look_at, Camera.orthographic])
+def test_matrices_tell_their_near_and_far(build, clip_z):
+    camera = build(*PLACE, 40.0, 0.5, 20.0, clip_z=clip_z)
+    given = Camera.from_matrices(camera.view_from_world, camera.clip_from_view(4, 2), clip_z=clip_z)
+    assert given.near == pytest.approx(0.5, rel=1e-12)
+    assert given.far == pytest.approx(20.0, rel=1e-12)
+    assert given.is_parallel == camera.is_parallel
+
+
+def test_reversed_depth_and_an_infinite_far_plane_are_understood():
+    # WebGPU's usual: clip z = near / depth, 1 at the near plane and 0 at infinity
+    matrix = [[2, 0, 0, 0], [0, 2, 0, 0], [0, 0, 0, 0.25], [0, 0, -1, 0]]
+    camera = Camera.from_matrices(np.eye(4), matrix, clip_z="0..1")
+    assert (camera.near, camera.far) == (0.25, np.inf)
+
+
+def test_a_transposed_webgl_array_is_recognised():
+    camera = Camera.look_at(*PLACE, 40.0, 0.5, 20.0)
+    with pytest.raises(SceneError, match="transpose a WebGL array"):
+        Camera.from_matrices(camera.view_from_world, camera.clip_from_view(4, 2).T)
+
+
+def test_aspect_must_agree_with_the_image():
+    camera = Camera.look_at(*PLACE, 40.0, 0.5, 20.0)
+    given = Camera.from_matrices(camera.view_from_world, camera.clip_from_view(4, 2))
+    given.check_aspect(400, 200)
+    rounded = Camera.from_matrices(camera.view_from_world, np.float32(camera.clip_from_view(4, 2)))
+    rounded.check_aspect(400, 200)
+    with pytest.raises(SceneError, match="aspect of the image, got 2 for 300 x 200"):
+        given.check_aspect(300, 200)

@@ -1,0 +1,86 @@
+import dataclasses
+import json
+
+import numpy as np
+import pytest
+
+import volref as vr
+from tests.scenes import camera_towards, colorful_transfer, rough_scene
+
+
+def stage(plan, name):
+    return next(stage for stage in plan.stages if stage.name == name)
+
+
+def test_every_stage_says_in_or_out_and_why():
+    plan = vr.plan(rough_scene())
+    assert [s.name for s in plan.stages] == [
+        "meshes",
+        "volume",
+        "empty space",
+        "early termination",
+        "background",
+    ]
+    assert all(s.reason for s in plan.stages)
+    assert "out  meshes" in str(plan)
+    assert json.loads(json.dumps(plan.as_dict()))["stages"][0]["included"] is False
+
+
+def test_the_default_step_is_half_the_least_spacing():
+    assert vr.plan(rough_scene(spacing=(1.0, 0.5, 3.0))).step == 0.25
+
+
+def test_a_volume_that_nothing_shows_is_left_out():
+    plan = vr.plan(rough_scene(transfer=vr.TransferFunction([2, 3], [(1, 1, 1)] * 2, [0, 1])))
+    assert not plan.includes("volume")
+    assert stage(plan, "volume").reason.startswith("opacity 0 for every value from 0.0")
+
+
+def test_an_optical_depth_that_cannot_end_a_ray_leaves_early_termination_out():
+    faint = rough_scene(transfer=colorful_transfer(extinction=0.1))
+    assert stage(vr.plan(faint), "early termination").reason.startswith(
+        "the optical depth of a ray cannot exceed"
+    )
+    assert vr.plan(rough_scene(transfer=colorful_transfer(extinction=9.0))).includes("early termination")
+
+
+def test_only_knots_that_the_volume_reaches_count_for_early_termination():
+    # 50 is far above the values, which end at 1; between 1 and 50 the extinction has risen by 1/49 of 1e3.
+    transfer = vr.TransferFunction([0, 1, 50], [(1, 1, 1)] * 3, [0, 0.01, 1e3])
+    assert not vr.plan(rough_scene(transfer=transfer)).includes("early termination")
+
+
+def test_a_sparse_volume_has_empty_space_and_a_full_one_has_none():
+    values = np.zeros((32, 32, 32))
+    values[8:10, 8:10, 8:10] = 1.0
+    volume = vr.Volume(values)
+    assert vr.plan(vr.Scene(volume, colorful_transfer(), camera_towards(volume), 4, 4)).includes(
+        "empty space"
+    )
+    assert not vr.plan(rough_scene(transfer=colorful_transfer(0.01))).includes("empty space")
+
+
+def test_everything_forces_all_that_was_left_out():
+    scene = rough_scene()
+    everything = vr.plan(scene).everything()
+    assert everything.occupied is None
+    assert everything.termination == 0.0
+    assert all(s.included for s in everything.stages if s.name not in ("empty space", "early termination"))
+    np.testing.assert_array_equal(vr.render(scene, plan=everything).rgba, vr.render(scene).rgba)
+
+
+def test_a_plan_can_be_changed_and_followed():
+    scene = rough_scene()
+    coarse = dataclasses.replace(vr.plan(scene), step=1.0)
+    assert vr.render(scene, plan=coarse).samples < vr.render(scene).samples
+
+
+@pytest.mark.parametrize("step", [0, -1, np.nan, np.inf, "a"])
+def test_a_step_that_is_no_length_is_refused(step):
+    with pytest.raises(vr.SceneError, match="step must be"):
+        vr.plan(rough_scene(), step=step)
+
+
+def test_an_unknown_method_is_refused():
+    with pytest.raises(vr.SceneError, match="method must be 'march', got 'euler'"):
+        vr.plan(rough_scene(), method="euler")
