@@ -168,7 +168,7 @@ VOLUMES = [
     BadFile(
         "missing file", lambda folder: folder / "none.npy", "volume", ("none.npy", "no such file", "check")
     ),
-    BadFile("a folder", lambda folder: folder, "volume", ("must end in",)),
+    BadFile("a folder", lambda folder: folder, "volume", ("got a folder", "check")),
     BadFile("empty file", file_of("a.npy", b""), "volume", ("a.npy", "an empty file", "write it again")),
     BadFile("unknown suffix", file_of("a.vti", b"x"), "volume", ("a.vti", ".nrrd", "'.vti'", "convert")),
     BadFile("not a .npy", file_of("a.npy", b"hello"), "volume", ("a.npy", "readable .npy")),
@@ -318,7 +318,7 @@ VOLUMES = [
         "NRRD data elsewhere",
         file_of("a.nhdr", nrrd_bytes(more=["data file: ../a.raw"])),
         "volume",
-        ("inside the folder", "'../a.raw'", "allow_outside"),
+        ("a.nhdr", "inside the folder", "'../a.raw'", "copy"),
     ),
     BadFile(
         "NRRD text", file_of("a.nrrd", nrrd_bytes(encoding="ascii", data=b"1 2")), "volume", ("'ascii'",)
@@ -479,7 +479,12 @@ SCENES = [
     BadFile("unknown key", scene_of(widht=3), "scene", ("widht", "key that is known", "use 'width'")),
     BadFile("unknown camera key", camera_of(fov_z=3), "scene", ("camera.fov_z", "use 'fov_y'")),
     BadFile("no camera", scene_of(camera=None), "scene", ("camera", "must be given", "add")),
-    BadFile("camera kind", camera_of(kind="fisheye"), "scene", ("camera.kind", "'fisheye'")),
+    BadFile(
+        "camera kind",
+        camera_of(kind="fisheye"),
+        "scene",
+        ("camera.kind", "'fisheye'", "'perspective' or 'orthographic' or 'matrix'"),
+    ),
     BadFile("text for a number", camera_of(near="close"), "scene", ("camera.near", "a number", "'close'")),
     BadFile("two numbers for a point", camera_of(eye=[0, 5]), "scene", ("camera.eye", "at least 3", "got 2")),
     BadFile("up parallel to the view", camera_of(up=[0, 0, 1]), "scene", ("camera.up", "parallel", "choose")),

@@ -138,6 +138,9 @@ def _problem_of_choice(
     value: object, branches: list[Mapping[str, Any]], definitions: Mapping[str, Any], name: str
 ) -> str | None:
     """Return None if one branch fits, else the problem of the branch that `value` looks most like."""
+    kind = _problem_of_kind(value, branches, name)
+    if kind is not None:
+        return kind
     problems = []
     for branch in branches:
         problem = find_problem(value, branch, definitions, name)
@@ -145,6 +148,15 @@ def _problem_of_choice(
             return None
         problems.append((_likeness(value, branch, definitions), problem))
     return max(problems, key=lambda pair: pair[0])[1]
+
+
+def _problem_of_kind(value: object, branches: list[Mapping[str, Any]], name: str) -> str | None:
+    """Return what is wrong with the key "kind" of an object whose branches are told apart by it."""
+    rules = [branch.get("properties", {}).get("kind", {}) for branch in branches]
+    if not isinstance(value, dict) or "kind" not in value or not all("const" in rule for rule in rules):
+        return None
+    kinds = list(dict.fromkeys(rule["const"] for rule in rules))
+    return find_problem(value["kind"], {"enum": kinds}, {}, _join(name, "kind"))
 
 
 def _likeness(

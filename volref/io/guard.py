@@ -56,22 +56,29 @@ def existing_file(path: str | Path) -> Path:
     return file
 
 
-def path_inside(folder: Path, text: str, *, allow_outside: bool = False) -> Path:
-    """Return the path `text` names relative to `folder`, links followed, after checking it stays inside.
+def path_inside(file: Path, text: str, *, allow_outside: bool | None = None) -> Path:
+    """Return the path that `file` names by `text`, links followed, after checking it stays in its folder.
+
+    `allow_outside` is None where the caller offers its user no such choice.
 
     Raises
     ------
     FormatError
-        If the path leads out of `folder` and `allow_outside` is False.
+        If the path leads out of the folder and `allow_outside` is not True.
     """
-    with wrapped(folder / "path", "path"):
+    folder = file.parent
+    try:
         target = (folder / text).resolve()
         inside = target.is_relative_to(folder.resolve())
+    except (OSError, ValueError, RuntimeError) as error:
+        message = f"{file.name}: path must name a file, got {one_line(text)!r} ({one_line(error)}); change it"
+        raise FormatError(message) from error
     stated_elsewhere = Path(text).is_absolute() or bool(PureWindowsPath(text).drive)
     if allow_outside or (inside and not stated_elsewhere):
         return target
-    message = f"path must stay inside the folder of the file that names it, got {one_line(text)!r}; "
-    raise FormatError(message + "copy the file beside it or pass allow_outside=True")
+    message = f"{file.name}: path must stay inside the folder of this file, got {one_line(text)!r}; "
+    choice = "" if allow_outside is None else " or pass allow_outside=True"
+    raise FormatError(message + "copy the file there and name it relative to this one" + choice)
 
 
 def check_memory(file: Path, needed: int, max_bytes: int, what: str) -> None:

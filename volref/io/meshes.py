@@ -138,7 +138,7 @@ def _resolver(file: Path, missing: list[str]) -> Foreign:
         def get(self, name: str) -> bytes:
             for spelling in (name.strip(), unquote(name.strip())):
                 try:
-                    return path_inside(file.parent, spelling).read_bytes()
+                    return path_inside(file, spelling).read_bytes()
                 except (OSError, FormatError):
                     continue
             missing.append(name)

@@ -67,7 +67,7 @@ def read_nrrd(path: str | Path, max_bytes: int) -> tuple[Numbers, dict[str, Any]
             detached = header.get("data file", header.get("datafile"))
             if detached is None:
                 return _read_samples(file, stream, header, size, max_bytes), place
-        data_file = existing_file(path_inside(file.parent, _single_name(file, detached)))
+        data_file = existing_file(path_inside(file, _single_name(file, detached)))
         with data_file.open("rb") as stream:
             return _read_samples(data_file, stream, header, size, max_bytes), place
 

@@ -49,7 +49,7 @@ def load_scene(path: str | Path, *, allow_outside: bool = False, max_bytes: int 
     check_document(file, document)
 
     def beside(reference: dict[str, Any]) -> Path:
-        return path_inside(file.parent, reference["path"], allow_outside=allow_outside)
+        return path_inside(file, reference["path"], allow_outside=allow_outside)
 
     meshes: list[Mesh] = []
     for entry in document.get("meshes", []):

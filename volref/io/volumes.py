@@ -71,13 +71,12 @@ def load_volume(
     SceneError
         If the volume breaks a rule of `Volume`.
     """
-    file = Path(path)
+    file = existing_file(path)
     reader = _reader_of(file)
-    existing_file(file)
     stated = {**_sidecar(file), **statement}
     for name in stated:
         if name not in (*GEOMETRY, *reader.keys):
-            message = f"{one_line(name)} must be something that a {reader.kind} file needs to be told, got "
+            message = f"{one_line(name)} must be a key that a {reader.kind} volume takes, got "
             message += f"{one_line(repr(stated[name]))} for {file.name}; "
             raise FormatError(message + nearest(name, (*GEOMETRY, *reader.keys)))
     missing = [name for name in reader.needed if name not in stated]

@@ -166,6 +166,14 @@ class TransferFunction:
         """What is linear between knots: "extinction" or "opacity"."""
         return "extinction" if self.extinction is not None else "opacity"
 
+    @property
+    def knot_extinction(self) -> Floats:
+        """Extinction at the knots (K,) per world unit, infinite where the opacity is 1."""
+        if self.opacity is None:
+            return np.asarray(self.extinction)
+        with np.errstate(divide="ignore"):
+            return np.asarray(-np.log1p(-self.opacity) / self.unit_distance)
+
     def most_extinction(self, low: float, high: float) -> float:
         """Return the greatest extinction of any value from `low` to `high`, infinite where the opacity is 1.
 
