@@ -1,0 +1,135 @@
+"""`volref render`: the image of a scene, and how far from the truth it may be."""
+
+import argparse
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from volref.cli.options import (
+    accuracy,
+    add_accuracy,
+    add_force,
+    add_json,
+    add_scene,
+    add_work,
+    read_scene,
+)
+from volref.cli.output import note, print_json, progress
+from volref.cli.verb import DIFFERS, GOOD, Verb
+from volref.errors import FormatError
+
+if TYPE_CHECKING:
+    from volref.truth.result import Render
+
+SUFFIXES = (".png", ".npy", ".npz")
+
+
+def _arguments(parser: argparse.ArgumentParser) -> None:
+    add_scene(parser)
+    parser.add_argument(
+        "-o",
+        "--output",
+        metavar="OUT",
+        action="append",
+        required=True,
+        help="file to write: .png for people (8-bit sRGB), .npy and .npz exact (float64, premultiplied, "
+        "linear); may be given several times",
+    )
+    add_accuracy(parser)
+    add_work(parser)
+    add_force(parser)
+    add_json(parser)
+
+
+def _run(options: argparse.Namespace) -> int:
+    from volref import render
+
+    targets = [Path(name) for name in options.output]
+    _check_targets(targets, force=options.force)
+    scene = read_scene(options)
+    with progress("render", quiet=options.quiet) as show:
+        out = render(scene, threads=options.threads, progress=show, **accuracy(options))
+    for target in targets:
+        out.save(target, overwrite=options.force)
+    if options.json:
+        print_json(_figures(out, options.output))
+    elif not options.quiet:
+        note(_summary(out, options.output))
+    if out.met_tolerance:
+        return GOOD
+    note(_shortfall(out))
+    return DIFFERS
+
+
+def _check_targets(targets: list[Path], *, force: bool) -> None:
+    """Refuse what could not be written, before the work rather than after it."""
+    from volref.io.atomic import check_free
+
+    for i, target in enumerate(targets):
+        if target.suffix.lower() not in SUFFIXES:
+            message = f"{target} must end in {', '.join(SUFFIXES)}, got {target.suffix!r}; rename it"
+            raise FormatError(message)
+        if target in targets[:i]:
+            message = f"{target} must be named once, got it twice; give each -o its own name"
+            raise FormatError(message)
+        if not target.parent.is_dir():
+            message = f"{target} must lie in a folder that exists, got {target.parent}; create it first"
+            raise FormatError(message)
+        check_free(target, overwrite=force)
+
+
+def _figures(out: "Render", outputs: list[str]) -> dict[str, Any]:
+    import numpy as np
+
+    return {
+        "outputs": outputs,
+        "width": out.rgba.shape[1],
+        "height": out.rgba.shape[0],
+        "seconds": out.seconds,
+        "samples": out.samples,
+        "threads": out.threads,
+        "bound": {
+            "kind": out.bound_kind,
+            "max": float(out.bound.max()),
+            "p99": float(np.percentile(out.bound, 99)),
+        },
+        "tolerance": out.plan.tolerance,
+        "met_tolerance": out.met_tolerance,
+        "plan": out.plan.as_dict(),
+    }
+
+
+def _summary(out: "Render", outputs: list[str]) -> str:
+    height, width = out.rgba.shape[:2]
+    return (
+        f"{width} x {height} pixels in {out.seconds:.2f} s, {out.samples:,} samples, largest error "
+        f"{out.bound.max():.3g} ({out.bound_kind}); wrote {', '.join(outputs)}"
+    )
+
+
+def _shortfall(out: "Render") -> str:
+    """Say by how much the tolerance is missed, and which step should meet it."""
+    largest, tolerance = float(out.bound.max()), out.plan.tolerance
+    missed = int((out.bound > tolerance).sum())
+    message = f"tolerance not met: error {largest:.3g} ({out.bound_kind}) above {tolerance:.3g} in {missed} "
+    message += f"pixel{'s' * (missed > 1)}"
+    if out.plan.termination >= tolerance:
+        return f"{message}; rays end at a transmittance of {out.plan.termination:g}: raise --tolerance"
+    # The error falls with the square of the step.
+    halvings = max(1, math.ceil(math.log(largest / tolerance, 4)))
+    return f"{message}; try --step {out.plan.step / 2**halvings:.6g} or raise --tolerance"
+
+
+VERB = Verb(
+    "render",
+    "the image of a scene, and how far from the truth it may be",
+    (
+        ("render scene.json -o image.png", "an image for people"),
+        ("render scene.json -o image.png -o image.npz --json", "also exact, with the figures as JSON"),
+        ("render scene.json -o fine.npy --step 0.1 --tolerance 1/5000", "a finer step, a stricter tolerance"),
+        ("render scene.json -o small.png --size 160x120 -j 1", "a quick look on one core"),
+    ),
+    _arguments,
+    _run,
+    notes="Exit status 1: the tolerance is not met.  The image is written all the same.",
+)
