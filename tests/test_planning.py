@@ -63,16 +63,22 @@ def test_a_sparse_volume_has_empty_space_and_a_full_one_has_none():
 def test_everything_forces_all_that_was_left_out():
     scene = rough_scene()
     everything = vr.plan(scene).everything()
-    assert everything.occupied is None
+    assert everything.occupancy is None
     assert everything.termination == 0.0
     assert all(s.included for s in everything.stages if s.name not in ("empty space", "early termination"))
     np.testing.assert_array_equal(vr.render(scene, plan=everything).rgba, vr.render(scene).rgba)
 
 
-def test_a_plan_can_be_changed_and_followed():
-    scene = rough_scene()
-    coarse = dataclasses.replace(vr.plan(scene), step=1.0)
-    assert vr.render(scene, plan=coarse).samples < vr.render(scene).samples
+def test_a_plan_with_another_step_is_followed_and_skips_only_what_it_may():
+    values = np.zeros((32, 32, 32))
+    values[8:10, 8:10, 8:10] = 1.0
+    volume = vr.Volume(values)
+    scene = vr.Scene(volume, colorful_transfer(), camera_towards(volume), 24, 24)
+    plan = vr.plan(scene)
+    for factor in (0.5, 2.0, 8.0):
+        changed = dataclasses.replace(plan, step=plan.step * factor, termination=0.0)
+        out = vr.render(scene, plan=changed)
+        np.testing.assert_array_equal(out.rgba, vr.render(scene, plan=changed.everything()).rgba)
 
 
 @pytest.mark.parametrize("step", [0, -1, np.nan, np.inf, "a"])

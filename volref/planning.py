@@ -49,6 +49,19 @@ class Stage:
 
 
 @dataclass(frozen=True, eq=False)
+class Occupancy:
+    """Where something can be seen: blocks of `BLOCK`^3 cells (bz, by, bx), with layers of blocks around.
+
+    A block counts as occupied if anything within `reach` world units of it is visible.  Index point p lies
+    in block floor(p / BLOCK) + `layers` (x, y, z); the layers hold every point within `reach` of the volume.
+    """
+
+    blocks: Booleans
+    layers: tuple[int, int, int]
+    reach: float
+
+
+@dataclass(frozen=True, eq=False)
 class Plan:
     """What `render` will do for one scene.
 
@@ -64,8 +77,8 @@ class Plan:
         A ray ends below this transmittance; 0: it never ends early.
     most_segments
         Segments on the longest possible ray.
-    occupied
-        Blocks of `BLOCK`^3 cells (bz, by, bx) near which something can be seen, or None: take all for seen.
+    occupancy
+        Where something can be seen, or None: everywhere.
     stages
         Each stage, in or out, and why.
     """
@@ -75,7 +88,7 @@ class Plan:
     tolerance: float
     termination: float
     most_segments: int
-    occupied: Booleans | None = field(repr=False)
+    occupancy: Occupancy | None = field(repr=False)
     stages: tuple[Stage, ...]
 
     def includes(self, name: str) -> bool:
@@ -92,7 +105,7 @@ class Plan:
             Stage(stage.name, included=False, reason="forced off") if stage.name in SHORTCUTS else stage
             for stage in stages
         )
-        return dataclasses.replace(self, termination=0.0, occupied=None, stages=stages)
+        return dataclasses.replace(self, termination=0.0, occupancy=None, stages=stages)
 
     def as_dict(self) -> dict[str, Any]:
         """Return the plan as plain data for JSON."""
@@ -148,11 +161,11 @@ def plan(
     stages.append(_volume_stage(scene.volume, seen=seen))
     if not seen:
         return Plan(method, length, tolerance, 0.0, 0, None, (*stages, _background_stage(scene)))
-    occupied, stage = _empty_space(scene.volume, scene.transfer, length)
+    occupancy, stage = _empty_space(scene.volume, scene.transfer, length)
     stages.append(stage)
     termination, stage = _early_termination(scene.volume, scene.transfer)
     stages.extend([stage, _background_stage(scene)])
-    return Plan(method, length, tolerance, termination, most_segments, occupied, tuple(stages))
+    return Plan(method, length, tolerance, termination, most_segments, occupancy, tuple(stages))
 
 
 def _meshes_stage(scene: Scene) -> Stage:
@@ -197,16 +210,16 @@ def _diagonal(volume: Volume) -> float:
     return float(np.linalg.norm(offsets, axis=-1).max())
 
 
-def _empty_space(volume: Volume, transfer: TransferFunction, length: float) -> tuple[Booleans | None, Stage]:
-    """Mark the blocks that can be seen from within half a block of segments, SEGMENTS_PER_BLOCK * step."""
-    half = SEGMENTS_PER_BLOCK * length / 2
+def _empty_space(volume: Volume, transfer: TransferFunction, step: float) -> tuple[Occupancy | None, Stage]:
+    """Mark the blocks that have something visible within half the length of a block of segments."""
+    half = SEGMENTS_PER_BLOCK * step / 2
     # A unit step in the world moves at most this many indices along each axis.
     indices_per_length = np.linalg.norm(volume.index_from_world[:3, :3], axis=1)
-    reach = np.ceil(half * indices_per_length * (1 + 1e-12)).astype(int)
+    x, y, z = (math.ceil(half * count * (1 + 1e-12)) for count in indices_per_length)
     name = "empty space"
-    if (reach > max(volume.size)).any():
+    if max(x, y, z) > max(volume.size):
         return None, Stage(name, included=False, reason="one block of segments is longer than the volume")
-    low, high = block_ranges(volume, BLOCK, (int(reach[0]), int(reach[1]), int(reach[2])))
+    low, high = block_ranges(volume, BLOCK, (x, y, z))
     # Interpolation may leave the range of its corners by rounding, unless they are all one value.
     slack = np.where(high > low, 8 * np.finfo(np.float64).eps * np.maximum(abs(low), abs(high)), 0.0)
     occupied = transfer.is_visible(low - slack, high + slack)
@@ -214,7 +227,10 @@ def _empty_space(volume: Volume, transfer: TransferFunction, length: float) -> t
     saved = f"{empty:.0%} of the {BLOCK}^3 blocks are transparent with their surroundings"
     if empty < LEAST_EMPTY_PART:
         return None, Stage(name, included=False, reason=f"{saved}: looking for them would cost more")
-    return occupied, Stage(name, included=True, reason=f"{saved}: no samples there")
+    # One index more than the reach: a "cell" volume begins half an index before its first block.
+    layers = (1 + x // BLOCK, 1 + y // BLOCK, 1 + z // BLOCK)
+    blocks = np.pad(occupied, [(layers[axis], layers[axis]) for axis in (2, 1, 0)], mode="edge")
+    return Occupancy(blocks, layers, half), Stage(name, included=True, reason=f"{saved}: no samples there")
 
 
 def _early_termination(volume: Volume, transfer: TransferFunction) -> tuple[float, Stage]:

@@ -16,8 +16,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from volref.arrays import Booleans, Floats, Indices, Numbers
-from volref.planning import BLOCK, SEGMENTS_PER_BLOCK, Plan
+from volref.arrays import Booleans, Floats, Indices
+from volref.planning import BLOCK, SEGMENTS_PER_BLOCK, Occupancy, Plan
 from volref.records import Spans
 from volref.scene.scene import Scene
 from volref.scene.transform import transform_directions, transform_points
@@ -133,17 +133,23 @@ def _march(field: Field, plan: Plan, state: Floats, counts: Indices, work: Works
     """March all rays of `state`, sorted by falling `counts`, in place; return the values interpolated."""
     samples = 0
     most = int(counts[0]) if len(counts) else 0
+    blocks_along = _blocks_along(plan, state)
     for first in range(0, most, SEGMENTS_PER_BLOCK):
         existing = _longer_than(counts, first)
-        live = _live(plan, state[:, :existing], first)
-        if live is None:
+        live = np.ones(existing, np.bool_)
+        if blocks_along is not None:
+            live &= _occupied(*blocks_along, state[:, :existing], first, work)
+        if plan.termination > 0:
+            live &= state[TRANSMITTANCE, :existing] >= plan.termination
+        if live.all():
             _march_block(field, plan.step, state[:, :existing], counts[:existing], first, work)
             samples += existing * SEGMENTS_PER_BLOCK
-        elif len(live):
-            part = state.take(live, axis=1)
-            _march_block(field, plan.step, part, counts[live], first, work)
-            state[ACCUMULATED, live] = part[ACCUMULATED]
-            samples += len(live) * SEGMENTS_PER_BLOCK
+        elif live.any():
+            chosen = np.flatnonzero(live)
+            part = state.take(chosen, axis=1)
+            _march_block(field, plan.step, part, counts[chosen], first, work)
+            state[ACCUMULATED, chosen] = part[ACCUMULATED]
+            samples += len(chosen) * SEGMENTS_PER_BLOCK
     return samples
 
 
@@ -152,23 +158,38 @@ def _longer_than(counts: Indices, segments: int) -> int:
     return int(np.searchsorted(-counts, -segments, side="left"))
 
 
-def _live(plan: Plan, rays: Floats, first: int) -> Indices | None:
-    """Return the rays that can still change in the block of segments from `first` on; None for all."""
-    live: Booleans | None = None
-    if plan.occupied is not None:
-        middle = rays[T_NEAR] + (first + SEGMENTS_PER_BLOCK / 2) * rays[STEP]
-        flat: Numbers = np.zeros(len(middle), np.intp)
-        for axis, blocks in zip((2, 1, 0), plan.occupied.shape, strict=True):
-            index = rays[ORIGIN][axis] + middle * rays[DIRECTION][axis]
-            block = np.clip(index / BLOCK, 0, blocks - 1, out=index).astype(np.intp)
-            flat = flat * blocks + block
-        live = plan.occupied.reshape(-1)[flat]
-    if plan.termination > 0:
-        shining = rays[TRANSMITTANCE] >= plan.termination
-        live = shining if live is None else live & shining
-    if live is None or live.all():
+def _blocks_along(plan: Plan, rays: Floats) -> tuple[Occupancy, Floats, Floats] | None:
+    """Return the occupancy, and the rays' origins and directions (3, R) counted in its blocks.
+
+    None where all is to be taken for occupied: by the plan, or because a block of segments is longer than
+    the reach that the occupancy was made for.
+    """
+    occupancy = plan.occupancy
+    if occupancy is None or plan.step * SEGMENTS_PER_BLOCK / 2 > occupancy.reach:
         return None
-    return np.flatnonzero(live)
+    origins = rays[ORIGIN] / BLOCK + np.array(occupancy.layers)[:, None]
+    return occupancy, origins, rays[DIRECTION] / BLOCK
+
+
+def _occupied(
+    occupancy: Occupancy, origins: Floats, directions: Floats, rays: Floats, first: int, work: Workspace
+) -> Booleans:
+    """Tell which rays (R,) can see something in the block of segments from `first` on.
+
+    The block around the middle of the segments answers for all of them: they lie within its reach.
+    """
+    count = rays.shape[1]
+    middle, place = work.get("middle", count), work.get("place in blocks", count)
+    np.multiply(rays[STEP], first + SEGMENTS_PER_BLOCK / 2, out=middle)
+    np.add(middle, rays[T_NEAR], out=middle)
+    flat, whole = np.zeros(count, np.intp), work.get("whole block", count, np.int32)
+    for axis, length in zip((2, 1, 0), occupancy.blocks.shape, strict=True):
+        np.multiply(middle, directions[axis, :count], out=place)
+        np.add(place, origins[axis, :count], out=place)
+        np.copyto(whole, place, casting="unsafe")
+        np.multiply(flat, length, out=flat)
+        np.add(flat, whole, out=flat)
+    return np.take(occupancy.blocks.reshape(-1), flat, mode="clip")
 
 
 def _march_block(
