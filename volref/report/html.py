@@ -1,0 +1,282 @@
+"""One rendered image as one HTML file: no scripts, no network, every picture inside.
+
+Whatever comes from a scene or a caller is text and is escaped here; nobody passes markup in.
+"""
+
+import base64
+import platform
+from collections.abc import Sequence
+from html import escape
+from importlib import resources
+
+import numpy as np
+
+from volref.arrays import Bytes, Numbers
+from volref.image import encode_rgba8
+from volref.planning import SHORTCUTS, Plan
+from volref.report.figures import KINDS, Figures, figures_of, levels
+from volref.report.pictures import VIRIDIS, ColoredMap, distance_map, error_map, png_bytes
+from volref.scene.camera import Camera
+from volref.scene.mesh import Mesh
+from volref.scene.scene import Scene
+from volref.scene.volume import Volume
+from volref.truth.result import Render
+
+Row = tuple[str, str]
+
+
+def render_page(
+    scene: Scene,
+    out: Render,
+    *,
+    title: str,
+    lead: str = "",
+    alt: str = "",
+    unit: str = "world units",
+    figures: Sequence[Row] = (),
+    repeat: Sequence[Row] = (),
+    notice: str = "",
+) -> str:
+    """Return an HTML page that shows an image, its error, its cost, and how it came about.
+
+    Parameters
+    ----------
+    scene, out
+        What was drawn, and the result of `volref.render`.
+    title, lead
+        Heading, and what the picture shows in a sentence or two.
+    alt
+        What the picture shows, for readers who do not see it; `lead` if empty.
+    unit
+        The unit of length of the scene's world.
+    figures
+        More (name, value) rows under the picture.
+    repeat
+        Ways to make the picture again: (what it is, the code).
+    notice
+        What must be said about the data.
+    """
+    numbers = figures_of(out)
+    parts = [
+        f"<header><h1>{escape(title)}</h1>{_paragraph(lead)}</header>",
+        _picture(scene, out, alt or lead or title),
+        _section("Error and time", _figures(numbers, figures)),
+        _section("Depth and error", _maps(out, unit)),
+        _section("What was done, and what was left out", _plan(out.plan, unit)),
+        _section("The scene", _rows(scene_rows(scene, unit))),
+        _section("Make it again", "".join(_code(name, code) for name, code in repeat)) if repeat else "",
+        _section("Versions", _rows(version_rows())),
+        _section("Data", f'<pre class="text">{escape(notice)}</pre>') if notice else "",
+    ]
+    return _document(title, "\n".join(part for part in parts if part))
+
+
+def scene_rows(scene: Scene, unit: str = "world units") -> list[Row]:
+    """Return what a scene holds as (name, words)."""
+    rows = [("image", f"{scene.width} x {scene.height} pixels")]
+    if scene.volume is not None:
+        rows += _volume_rows(scene.volume, unit)
+    if scene.transfer is not None:
+        knots, kind = scene.transfer.values, scene.transfer.interpolation
+        span = f"{knots[0]:g} to {knots[-1]:g}"
+        rows.append(("transfer function", f"{len(knots)} knots from {span}, {kind} linear between them"))
+    rows += [_mesh_row(i, mesh) for i, mesh in enumerate(scene.meshes)]
+    rows += _camera_rows(scene.camera, unit)
+    rows.append(("background", f"{_numbers(scene.background)} (premultiplied RGBA, working space)"))
+    return rows
+
+
+def version_rows() -> list[Row]:
+    """Return the versions that a number on the page may depend on."""
+    from volref import __version__
+
+    return [
+        ("volref", __version__),
+        ("Python", platform.python_version()),
+        ("NumPy", np.__version__),
+        ("machine", f"{platform.system()} {platform.machine()}"),
+    ]
+
+
+def _volume_rows(volume: Volume, unit: str) -> list[Row]:
+    low, high = volume.value_bounds
+    return [
+        ("volume", f"{' x '.join(map(str, volume.size))} voxels, {volume.values.dtype}"),
+        ("spacing", f"{' x '.join(f'{s:g}' for s in volume.spacing)} {unit}"),
+        ("values", f"{low:g} to {high:g}"),
+    ]
+
+
+def _mesh_row(index: int, mesh: Mesh) -> Row:
+    dropped = f", {mesh.dropped} without an area dropped" if mesh.dropped else ""
+    words = f"{len(mesh.faces):,} triangles, {len(mesh.vertices):,} vertices{dropped}"
+    return f"mesh {index}", f"{words}; colour: {mesh.coloring}"
+
+
+def _camera_rows(camera: Camera, unit: str) -> list[Row]:
+    world = camera.world_from_view
+    opening = {
+        "perspective": f"perspective, {camera.fov_y} degrees high",
+        "orthographic": f"orthographic, {camera.height} {unit} high",
+        "matrix": "given by its matrices",
+    }[camera.kind]
+    place = f"at {_numbers(world[:3, 3])}, looking along {_numbers(-world[:3, 2])} ({unit})"
+    return [("camera", f"{opening}; {place}")]
+
+
+def _picture(scene: Scene, out: Render, alt: str) -> str:
+    image = _image(encode_rgba8(out.rgba), alt, scene.width, scene.height)
+    caption = f"<strong>{escape(figures_of(out).sentence)}</strong>"
+    return f'<figure class="picture">{image}<figcaption>{caption}</figcaption></figure>'
+
+
+def _figures(numbers: Figures, more: Sequence[Row]) -> str:
+    kind, meaning = KINDS[numbers.error_kind]
+    rows: list[Row] = []
+    if numbers.error_kind != "none":
+        rows += [
+            (f"{kind} error, largest", f"{levels(numbers.error_max)} / 255"),
+            (f"{kind} error, 99% of pixels below", f"{levels(numbers.error_p99)} / 255"),
+            (f"{kind} error, median", f"{levels(numbers.error_median)} / 255"),
+            (f"pixels within {levels(numbers.tolerance)} / 255", f"{_floor_percent(numbers.within)}%"),
+        ]
+    rows += [
+        ("rendering", f"{numbers.seconds:.2f} s"),
+        ("threads", str(numbers.threads)),
+        ("samples", f"{numbers.samples:,}"),
+    ]
+    if numbers.ns_per_sample is not None:
+        rows.append(("wall time per sample", f"{numbers.ns_per_sample:.0f} ns"))
+    tiles = "".join(
+        f"<div><dt>{escape(name)}</dt><dd>{escape(value)}</dd></div>" for name, value in [*rows, *more]
+    )
+    scale = (
+        "Errors are in the working space, the largest over red, green, blue and alpha; 1/255 is one level "
+    )
+    scale += "of an 8-bit image."
+    return f'<dl class="figures">{tiles}</dl>{_paragraph(f"{meaning} {scale}")}'
+
+
+def _maps(out: Render, unit: str) -> str:
+    distance = distance_map(out.distance, unit)
+    error = error_map(out.bound)
+    surface = float(np.isfinite(out.distance).mean())
+    nothing = "No ray meets a surface."
+    seen = f"Distance along the ray to the first surface, which {surface:.0%} of the rays meet."
+    kind = KINDS[out.bound_kind][0]
+    about = f"{kind.capitalize()} error of each pixel, on a logarithmic scale."
+    return (
+        '<div class="pair">'
+        + _map("Depth", distance, seen if surface else nothing)
+        + _map("Error", error, about)
+        + "</div>"
+    )
+
+
+def _map(name: str, picture: ColoredMap, about: str) -> str:
+    height, width = picture.colors.shape[:2]
+    ends = f" Scale: {picture.ticks[0][1]} to {picture.ticks[-1][1]} {picture.unit}." if picture.ticks else ""
+    image = _image(picture.colors, f"{name} map. {about}{ends}", width, height)
+    caption = f"<h3>{name}</h3>{_legend(picture)}{_paragraph(about)}"
+    return f"<figure>{image}<figcaption>{caption}</figcaption></figure>"
+
+
+def _legend(picture: ColoredMap) -> str:
+    parts = []
+    if picture.ticks:
+        words = "".join(
+            f'<span style="left:{100 * place:g}%" class="{_side(place)}">{escape(word)}</span>'
+            for place, word in picture.ticks
+        )
+        parts.append(f'<div class="scale"></div><div class="ticks">{words}</div>')
+        parts.append(f'<p class="key">{escape(picture.unit)}</p>')
+    if picture.neutral:
+        parts.append(f'<p class="key"><span class="neutral"></span> {escape(picture.neutral)}</p>')
+    return "".join(parts)
+
+
+def _side(place: float) -> str:
+    return {0.0: "first", 1.0: "last"}.get(place, "middle")
+
+
+def _plan(plan: Plan, unit: str) -> str:
+    how = f"Method {plan.method}"
+    if plan.step:
+        how += f": a sample every {plan.step:g} {unit}, at most {plan.most_segments} on a ray"
+    left_out = [stage.name for stage in plan.stages if not stage.included]
+    saving = [stage.name for stage in plan.stages if stage.included and stage.name in SHORTCUTS]
+    told = f"Stages left out: {', '.join(left_out) or 'none'}. "
+    told += f"Work saved by: {', '.join(saving) or 'nothing'}."
+    rows = "".join(
+        f'<tr><th scope="row">{escape(stage.name)}</th>'
+        f'<td class="{"in" if stage.included else "out"}">{"in" if stage.included else "left out"}</td>'
+        f"<td>{escape(stage.reason)}</td></tr>"
+        for stage in plan.stages
+    )
+    head = '<tr><th scope="col">stage</th><th scope="col">in or out</th><th scope="col">why</th></tr>'
+    table = f"<table><thead>{head}</thead><tbody>{rows}</tbody></table>"
+    return _paragraph(f"{how}. {told}") + _scrolling("Stages", table)
+
+
+def _rows(rows: Sequence[Row]) -> str:
+    body = "".join(
+        f'<tr><th scope="row">{escape(name)}</th><td>{escape(value)}</td></tr>' for name, value in rows
+    )
+    return _scrolling("Facts", f"<table><tbody>{body}</tbody></table>")
+
+
+def _scrolling(name: str, table: str) -> str:
+    """Wrap what may be wider than a phone so that it scrolls by itself, by keyboard too."""
+    return f'<div class="scroll" role="region" aria-label="{escape(name)}" tabindex="0">{table}</div>'
+
+
+def _code(name: str, code: str) -> str:
+    label = escape(name)
+    return f'<h3>{label}</h3><pre tabindex="0" aria-label="{label}"><code>{escape(code)}</code></pre>'
+
+
+def _section(name: str, content: str) -> str:
+    label = "-".join(word for word in name.lower().replace(",", "").split())
+    return f'<section aria-labelledby="{label}"><h2 id="{label}">{escape(name)}</h2>{content}</section>'
+
+
+def _paragraph(text: str) -> str:
+    return f"<p>{escape(text)}</p>" if text else ""
+
+
+def _image(codes: Bytes, alt: str, width: int, height: int) -> str:
+    data = base64.b64encode(png_bytes(codes)).decode("ascii")
+    return f'<img alt="{escape(alt)}" width="{width}" height="{height}" src="data:image/png;base64,{data}">'
+
+
+def _numbers(values: Sequence[float] | Numbers) -> str:
+    return "(" + ", ".join(f"{float(value) + 0.0:.4g}" for value in values) + ")"
+
+
+def _floor_percent(part: float) -> str:
+    """Return a percentage that says 100 only for all."""
+    return f"{np.floor(part * 1000) / 10:g}"
+
+
+def _document(title: str, body: str) -> str:
+    style = resources.files("volref.report").joinpath("page.css").read_text(encoding="utf-8")
+    colors = ", ".join(f"rgb({r} {g} {b})" for r, g, b in VIRIDIS.tolist())
+    policy = "default-src 'none'; img-src data:; style-src 'unsafe-inline'"
+    return f"""<!doctype html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<meta http-equiv="Content-Security-Policy" content="{policy}">
+<title>{escape(title)}</title>
+<style>
+{style}.scale {{ background: linear-gradient(to right, {colors}); }}
+</style>
+</head>
+<body>
+<main>
+{body}
+</main>
+</body>
+</html>
+"""
