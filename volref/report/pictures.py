@@ -32,7 +32,7 @@ VIRIDIS = np.array(
 # No colour of the map: there is no number here.
 NEUTRAL = (128, 128, 132)
 
-# The least and greatest decade apart that an error map shows.
+# Powers of ten that an error map spans.
 DECADES = 4
 
 # An 8-bit level: errors are told in these.
@@ -103,8 +103,7 @@ def error_map(bound: Floats) -> ColoredMap:
     seen = bound > 0
     if not seen.any():
         return ColoredMap(_painted(np.zeros(bound.shape), seen), (), "levels of 1/255", "error 0")
-    # The tolerance keeps 1/255, an ulp above a whole level, at the decade of 1.
-    top = math.ceil(math.log10(float(bound.max()) / LEVEL) - 1e-9)
+    top = math.ceil(math.log10(float(bound.max()) / LEVEL))
     exponent = np.log10(np.where(seen, bound, 1.0) / LEVEL)
     decades = range(DECADES + 1)
     ticks = tuple((k / DECADES, f"{10.0 ** (top - DECADES + k):g}") for k in decades)
