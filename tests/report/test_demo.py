@@ -196,7 +196,7 @@ def test_the_page_shows_the_error_the_time_and_the_notice(folder, found):
     assert page.texts("strong") == [found["message"]]
     assert f"{found['seconds']:.2f} s" in found["message"]
     assert "Copyright (C) 1993-2009 Louis Collins" in " ".join(page.texts("pre"))
-    assert "volref demo" in page.texts("code")
+    assert page.texts("code")[0] == f"volref demo --size {SIDE}x{SIDE}"
 
 
 def test_the_python_on_the_page_makes_the_picture(found, rgba):

@@ -130,7 +130,10 @@ def demo_page(scene: Scene, out: Render, loaded: float) -> str:
         alt=ALT,
         unit="mm",
         figures=[("reading the scene", f"{loaded:.2f} s")],
-        repeat=[("From a terminal", "volref demo"), ("From Python, and every number of one ray", python)],
+        repeat=[
+            ("From a terminal", f"volref demo --size {scene.width}x{scene.height}"),
+            ("From Python, and every number of one ray", python),
+        ],
         notice=(DATA / "NOTICE.txt").read_text(encoding="utf-8"),
     )
 
