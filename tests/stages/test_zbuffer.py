@@ -143,8 +143,9 @@ def test_nothing_is_drawn_of_no_triangles():
 
 
 @pytest.mark.parametrize("camera", [PARALLEL, PERSPECTIVE], ids=["parallel", "perspective"])
-def test_of_coincident_triangles_the_lowest_source_wins(camera):
-    triangle = np.array([(1.3, -2.0, 5.0), (14.7, 3.1, 9.0), (4.9, 15.2, 31.0)])
+@pytest.mark.parametrize("second_y", [3.1, -2.0], ids=["oblique", "with a level edge"])
+def test_of_coincident_triangles_the_lowest_source_wins(camera, second_y):
+    triangle = np.array([(1.3, -2.0, 5.0), (14.7, second_y, 9.0), (4.9, 15.2, 31.0)])
     copies = [triangle[list(order)] for order in ((0, 1, 2), (2, 1, 0), (1, 2, 0), (1, 0, 2))]
     for source in ([5, 3, 8, 4], [3, 4, 5, 8], [8, 5, 4, 3]):
         image = drawn(copies, 16, 16, camera, source=source)
@@ -175,8 +176,11 @@ def test_fragments_beyond_the_far_plane_are_left_out_one_by_one():
 
 
 def test_a_triangle_on_the_far_plane_is_seen():
-    assert (drawn([[(-9, -9, 100.0), (99, -9, 100.0), (-9, 99, 100.0)]], 4, 4, PERSPECTIVE) == 0).all()
-    assert (drawn([[(-9, -9, 100.0), (99, -9, 100.0), (-9, 99, 100.0)]], 4, 4, PARALLEL) == 0).all()
+    upon = [(-9, -9, 100.0), (99, -9, 100.0), (-9, 99, 100.0)]
+    beyond = [(-9, -9, 101.0), (99, -9, 100.0), (-9, 99, 101.0)]
+    for camera in (PERSPECTIVE, PARALLEL):
+        assert (drawn([upon], 4, 4, camera) == 0).all()
+        assert (drawn([beyond, upon], 4, 4, camera) == 1).all()
 
 
 def test_a_sliver_seen_edge_on_never_reaches_beyond_its_own_corners():
