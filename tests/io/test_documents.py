@@ -151,6 +151,14 @@ def test_the_schema_lists_what_the_volume_readers_take():
     assert SCHEMA["$defs"]["volume"]["properties"]["dtype"]["enum"] == list(RAW_TYPES)
 
 
+@pytest.mark.parametrize(
+    ("version", "valid"), [(1, True), (1.0, True), (True, False), ("1", False), (2, False)]
+)
+def test_both_take_1_and_1_0_for_the_version_but_not_true(version, valid):
+    document = as_json(scene_document(format_version=version))
+    assert our_verdict(document) == JUDGE.is_valid(document) == valid
+
+
 def test_an_unknown_key_is_named_with_the_nearest_known_one(tmp_path):
     document = scene_document(camera={**CAMERA, "fovy": 3})
     with pytest.raises(FormatError, match=r"scene\.json: camera\.fovy must be .* use 'fov_y'$"):
