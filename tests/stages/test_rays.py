@@ -89,3 +89,13 @@ def test_projected_points_lie_on_the_rays_of_their_pixels():
     np.testing.assert_allclose(
         points[:, :2] / points[:, 3:], pixel_ndc(width, height, all_pixels(4, 3)), atol=1e-14
     )
+
+
+@pytest.mark.parametrize("build", [Camera.look_at, Camera.orthographic])
+def test_a_ray_is_the_same_to_the_bit_in_any_company(build):
+    camera = build((3, 1, 2), (0, 0.5, 0), (0.1, 1, 0), 35.0, 0.5, 20.0)
+    together = pixel_rays(camera, 37, 23, all_pixels(37, 23))
+    for part in (np.arange(5), np.arange(5, 6), np.arange(300, 851, 3)):
+        rays = pixel_rays(camera, 37, 23, part)
+        np.testing.assert_array_equal(rays.origins, together.origins[part])
+        np.testing.assert_array_equal(rays.directions, together.directions[part])

@@ -26,12 +26,17 @@ def transform_points(matrix: Floats, points: Floats) -> Floats:
     >>> transform_points(affine(np.eye(3), np.array([1.0, 0.0, 0.0])), np.zeros((1, 3)))
     array([[1., 0., 0.]])
     """
-    return points @ matrix[:3, :3].T + matrix[:3, 3]
+    return transform_directions(matrix, points) + matrix[:3, 3]
 
 
 def transform_directions(matrix: Floats, directions: Floats) -> Floats:
-    """Apply the linear part of an affine 4x4 matrix to directions (..., 3)."""
-    return directions @ matrix[:3, :3].T
+    """Apply the linear part of an affine 4x4 matrix to directions (..., 3).
+
+    Written out, because a matrix product may round a row differently in an array of another length, and a
+    ray must not depend on the chunk that it stands in.
+    """
+    x, y, z = np.moveaxis(directions, -1, 0)
+    return np.stack([row[0] * x + row[1] * y + row[2] * z for row in matrix[:3, :3]], axis=-1)
 
 
 def invert_affine(name: str, matrix: Floats) -> Floats:

@@ -26,20 +26,20 @@ def pixel_rays(camera: Camera, width: int, height: int, pixels: Indices) -> Rays
     >>> rays.origins.tolist(), rays.directions.tolist()
     ([[0.0, 0.0, 5.0]], [[0.0, 0.0, -1.0]])
     """
-    ndc = pixel_ndc(width, height, pixels)
     clip = camera.clip_from_view(width, height)
     view_z = -camera.near if camera.is_parallel else -1.0
-    shift = clip[:2, 2] * view_z + clip[:2, 3]
-    view = np.empty((len(pixels), 3))
-    view[:, :2] = np.linalg.solve(clip[:2, :2], (ndc - shift).T).T
-    view[:, 2] = view_z
+    (a, b), (c, d) = clip[:2, :2]
+    x, y = (pixel_ndc(width, height, pixels) - (clip[:2, 2] * view_z + clip[:2, 3])).T
+    determinant = a * d - b * c
+    view_x, view_y = (d * x - b * y) / determinant, (a * y - c * x) / determinant
+    view = np.stack([view_x, view_y, np.full(len(pixels), view_z)], axis=-1)
     world_from_view = camera.world_from_view
     if camera.is_parallel:
         forward = transform_directions(world_from_view, np.array([0.0, 0.0, -1.0]))
         directions = np.broadcast_to(forward / np.linalg.norm(forward), view.shape)
         return Rays(transform_points(world_from_view, view), directions)
     directions = transform_directions(world_from_view, view)
-    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    directions /= np.sqrt((directions**2).sum(axis=1, keepdims=True))
     return Rays(np.broadcast_to(world_from_view[:3, 3], view.shape), directions)
 
 
