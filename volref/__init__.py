@@ -7,33 +7,40 @@
 
 Images are float64 (height, width, 4), row 0 at the top, premultiplied.  Volumes are (nz, ny, nx), points
 (x, y, z), worlds right-handed.
+
+The names below are loaded when they are first used, so that `import volref` and `volref --help` cost next
+to nothing.
 """
 
-from volref.errors import FormatError, SceneError
-from volref.io import (
-    AtlasLayout,
-    convert_volume,
-    describe_file,
-    load_mesh,
-    load_meshes,
-    load_raw,
-    load_scene,
-    load_transfer,
-    load_volume,
-    read_image,
-    save_mesh,
-    save_scene,
-    save_transfer,
-    save_volume,
-    scene_schema,
-    write_image,
-)
-from volref.oracle.metrics import Comparison, compare
-from volref.planning import Plan, plan
-from volref.scene import Camera, Mesh, Scene, TransferFunction, Volume
-from volref.truth.rendering import render
-from volref.truth.result import Render
-from volref.truth.tracing import Trace, trace
+import importlib
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from volref.errors import FormatError, SceneError
+    from volref.io import (
+        AtlasLayout,
+        convert_volume,
+        describe_file,
+        load_mesh,
+        load_meshes,
+        load_raw,
+        load_scene,
+        load_transfer,
+        load_volume,
+        read_image,
+        save_mesh,
+        save_scene,
+        save_transfer,
+        save_volume,
+        scene_schema,
+        write_image,
+    )
+    from volref.oracle.metrics import Comparison, compare
+    from volref.planning import Plan, plan
+    from volref.scene import Camera, Mesh, Scene, TransferFunction, Volume
+    from volref.truth.rendering import render
+    from volref.truth.result import Render
+    from volref.truth.tracing import Trace, trace
 
 __version__ = "0.1.0"
 
@@ -70,3 +77,32 @@ __all__ = [
     "trace",
     "write_image",
 ]
+
+# Where the names live; those not listed are in volref.io.
+_HOMES = {
+    "volref.errors": ("FormatError", "SceneError"),
+    "volref.oracle.metrics": ("Comparison", "compare"),
+    "volref.planning": ("Plan", "plan"),
+    "volref.scene": ("Camera", "Mesh", "Scene", "TransferFunction", "Volume"),
+    "volref.truth.rendering": ("render",),
+    "volref.truth.result": ("Render",),
+    "volref.truth.tracing": ("Trace", "trace"),
+}
+_HOME = dict.fromkeys(__all__, "volref.io") | {
+    name: home for home, names in _HOMES.items() for name in names
+}
+
+
+def __getattr__(name: str) -> object:
+    """Load a public name from where it lives (PEP 562)."""
+    if name not in _HOME:
+        message = f"module 'volref' has no attribute {name!r}"
+        raise AttributeError(message)
+    value: object = getattr(importlib.import_module(_HOME[name]), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    """List the public names, loaded or not."""
+    return sorted([*globals(), *__all__])
