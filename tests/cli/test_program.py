@@ -1,6 +1,7 @@
 """The command line as a whole: help, typos, errors, streams, signals."""
 
 import json
+import os
 import signal
 import subprocess
 import sys
@@ -87,7 +88,9 @@ def test_a_mistyped_option_suggests_the_nearest(capsys):
 
 
 def test_options_are_not_abbreviated(capsys):
-    refused(capsys, "render", "scene.json", "-o", "x.png", "--thread", "2")
+    assert "unrecognized arguments: --thread 2" in refused(capsys, "plan", "s.json", "--thread", "2")
+    line = refused(capsys, "render", "s.json", "-o", "x.png", "--thread", "2")
+    assert line == "volref: unrecognized arguments: --thread 2; did you mean --threads?\n"
 
 
 @pytest.mark.parametrize(
@@ -240,6 +243,17 @@ def test_a_reader_that_leaves_early_is_no_error(scene_file):
     assert process.stderr.read() == b""
     process.stderr.close()
     assert process.wait() == 128 + signal.SIGPIPE
+
+
+def test_a_reader_that_never_listened_is_no_error_either():
+    read_end, write_end = os.pipe()
+    os.close(read_end)
+    # With a buffer, as usual: the pipe is found broken only when the last words are flushed.
+    buffered = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
+    words = [*COMMAND, "report"]
+    done = subprocess.run(words, stdout=write_end, stderr=subprocess.PIPE, env=buffered, check=False)
+    os.close(write_end)
+    assert (done.returncode, done.stderr) == (128 + signal.SIGPIPE, b"")
 
 
 def test_ctrl_c_ends_in_one_line_and_leaves_no_file(tmp_path):

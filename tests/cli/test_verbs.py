@@ -23,8 +23,10 @@ def images(tmp_path):
     """Two opaque images whose 8-bit codes differ by 2 levels in one pixel; paths of PNG files."""
     codes = np.full((12, 14, 4), 255, np.uint8)
     codes[..., :3] = np.random.default_rng(1).integers(0, 250, (12, 14, 3))
+    # 82/255 - 80/255 is more than 2/255 in float64.
+    codes[5, 9, 1] = 80
     other = codes.copy()
-    other[5, 9, 1] += 2
+    other[5, 9, 1] = 82
     paths = tmp_path / "a.png", tmp_path / "b.png"
     for path, array in zip(paths, (codes, other), strict=True):
         Image.fromarray(array).save(path)
