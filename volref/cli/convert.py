@@ -16,6 +16,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--nan",
         type=nan_policy,
+        metavar="VALUE",
         default="refuse",
         help="'refuse' (default), or the number to put in place of NaN",
     )

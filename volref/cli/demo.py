@@ -39,7 +39,7 @@ VERB = Verb(
     "start here: a scene, its image and a page that explains them",
     (
         ("demo", "write volref-demo/ and say what is in it"),
-        ("demo -o /tmp/first --size 320x240", "elsewhere and smaller"),
+        ("demo -o small-demo --size 320x240", "elsewhere and smaller"),
     ),
     _arguments,
     _run,

@@ -153,11 +153,13 @@ def add_accuracy(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--step",
         type=fraction,
+        metavar="L",
         help="length of a segment in world units; default half the least voxel spacing",
     )
     parser.add_argument(
         "--tolerance",
         type=fraction,
+        metavar="E",
         help="error per pixel to stay below, e.g. 1/1000; default 1/510, half a level of an 8-bit image",
     )
 

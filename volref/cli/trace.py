@@ -14,6 +14,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--step",
         type=fraction,
+        metavar="L",
         help="length of a segment in world units; default half the least voxel spacing",
     )
     add_json(parser)
