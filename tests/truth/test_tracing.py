@@ -62,6 +62,8 @@ def test_a_ray_that_misses_says_so_and_keeps_the_background():
     trace = vr.trace(scene, (0, 0))
     assert trace.head["span"] is None
     assert trace.head["ended"] == "the ray misses the volume"
+    assert str(trace).splitlines()[-1] == "rgba: 0.1 0 0 0.2"
+    assert json.loads(trace.to_json())["segments"] == {}
     assert trace.head["rgba"] == [0.1, 0, 0, 0.2]
 
 

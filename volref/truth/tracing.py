@@ -67,6 +67,8 @@ class Trace:
     def __str__(self) -> str:
         """Return the trace as a table for people, the widest columns left to the JSON."""
         lines = [f"{name}: {_words(value)}" for name, value in self.head.items()]
+        if not self.table:
+            return "\n".join(lines)
         shown = [name for name in self.table if name not in ("cell", "fraction", "corners", "position")]
         lines.append("  ".join(f"{name:>{12 * COLUMNS[name][0]}}" for name in shown))
         for row in range(len(self.table["segment"])):
