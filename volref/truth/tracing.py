@@ -199,6 +199,8 @@ def _corner_samples(values: Numbers, cell: Numbers) -> Floats:
 
 
 def _words(value: object) -> str:
+    if isinstance(value, dict):
+        return ", ".join(f"{name} {_words(part)}" for name, part in value.items())
     if isinstance(value, list):
-        return " ".join(f"{number:.6g}" for number in value)
-    return str(value)
+        return " ".join(map(_words, value))
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
