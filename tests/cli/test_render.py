@@ -175,6 +175,12 @@ def test_trace_prints_the_ray(scene_file, capsys):
     assert (status, out, err) == (0, f"{expected.to_json()}\n", "")
 
 
+def test_a_ray_that_misses_the_volume_says_so(scene_file, capsys):
+    assert "ended: the ray misses the volume" in run(capsys, "trace", scene_file, "0", "0")[1]
+    status, out, _ = run(capsys, "trace", scene_file, "0", "0", "--json")
+    assert (status, json.loads(out)["segments"]) == (0, {})
+
+
 @pytest.mark.parametrize("pixel", [("24", "0"), ("0", "16"), ("-1", "0")])
 def test_a_pixel_outside_the_image_is_refused(pixel, scene_file, capsys):
     status, out, err = run(capsys, "trace", scene_file, *pixel)

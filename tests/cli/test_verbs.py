@@ -2,6 +2,7 @@
 
 import json
 import platform
+from importlib import metadata
 
 import numpy as np
 import pytest
@@ -192,8 +193,6 @@ def test_report_names_every_package_with_its_version(capsys):
 
 
 def test_a_missing_extra_is_null(capsys, monkeypatch):
-    from importlib import metadata
-
     real = metadata.version
 
     def without_tqdm(package):
@@ -201,17 +200,15 @@ def test_a_missing_extra_is_null(capsys, monkeypatch):
             raise metadata.PackageNotFoundError(package)
         return real(package)
 
-    monkeypatch.setattr("volref.cli.report.metadata.version", without_tqdm)
+    monkeypatch.setattr("importlib.metadata.version", without_tqdm)
     assert json.loads(run(capsys, "report", "--json")[1])["extras"]["cli"] == {"tqdm": None}
 
 
 def test_a_source_tree_that_is_not_installed_still_reports(capsys, monkeypatch):
-    from importlib import metadata
-
     def missing(package):
         raise metadata.PackageNotFoundError(package)
 
-    monkeypatch.setattr("volref.cli.report.metadata.requires", missing)
+    monkeypatch.setattr("importlib.metadata.requires", missing)
     found = json.loads(run(capsys, "report", "--json")[1])
     assert (found["packages"], found["extras"]) == ({}, {})
 

@@ -243,6 +243,16 @@ def test_delta_e_leaves_out_the_pixels_that_are_clear_in_both_images():
     assert compare(np.zeros((2, 2, 4)), np.zeros((2, 2, 4))).delta_e_max == 0
 
 
+def test_every_pixel_of_a_large_image_has_its_delta_e():
+    a = premultiplied_noise(130, 130) * 0.5 + 0.25  # 16900 pixels: more than are taken at once
+    b = a + noise(130, 130, 1, seed=2) / 8
+    whole = compare(a, b, encoding="srgb")
+    halves = [compare(a[rows], b[rows], encoding="srgb") for rows in (slice(65), slice(65, None))]
+    # Sums of as many terms in another order: 16900 x 2^-53.
+    assert whole.delta_e_mean == pytest.approx(sum(half.delta_e_mean for half in halves) / 2, rel=2e-12)
+    assert whole.delta_e_max == max(half.delta_e_max for half in halves)
+
+
 def test_what_a_display_cannot_show_differs_in_numbers_only():
     bright, brighter = np.full((11, 11, 3), 1.5), np.full((11, 11, 3), 2.0)
     found = compare(bright, brighter)

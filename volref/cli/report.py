@@ -5,7 +5,6 @@ import os
 import platform
 import re
 from collections.abc import Mapping
-from importlib import metadata
 from typing import Any
 
 from volref.cli.options import add_json
@@ -56,6 +55,8 @@ def _simd() -> dict[str, list[str]]:
 
 def _requirements() -> list[tuple[str, str | None]]:
     """Return (package, extra or None) for each requirement that volref was installed with."""
+    from importlib import metadata
+
     try:
         stated = metadata.requires("volref") or []
     except metadata.PackageNotFoundError:
@@ -82,6 +83,8 @@ def _versions_by_extra() -> dict[str, dict[str, str | None]]:
 
 
 def _version(package: str) -> str | None:
+    from importlib import metadata
+
     try:
         return metadata.version(package)
     except metadata.PackageNotFoundError:
