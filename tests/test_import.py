@@ -36,8 +36,3 @@ def test_every_public_name_is_there():
     assert set(volref.__all__) <= set(dir(volref))
     with pytest.raises(AttributeError, match="no attribute 'rendre'"):
         _ = volref.rendre
-
-
-@pytest.mark.parametrize("program", ["import volref", HELP], ids=["import", "help"])
-def test_nor_do_they_load_numpy(program):
-    assert "numpy" not in loaded_after(program)
