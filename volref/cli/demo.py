@@ -1,4 +1,4 @@
-"""`volref demo`: a scene to start with, rendered, traced and explained."""
+"""`volref demo`: a scene to start with, rendered and explained."""
 
 import argparse
 
@@ -31,12 +31,13 @@ def _run(options: argparse.Namespace) -> int:
         print(found["message"])
         print(f"wrote {', '.join(found['files'])}")
         print(f"open {found['page']} in a browser")
+        print(f"the scene, to try the other verbs on: {found['scene']}")
     return GOOD
 
 
 VERB = Verb(
     "demo",
-    "start here: a scene, its image and a page that explains them",
+    "start here: a head MRI with its white matter, its error and its time, on one page",
     (
         ("demo", "write volref-demo/ and say what is in it"),
         ("demo -o small-demo --size 320x240", "elsewhere and smaller"),

@@ -25,7 +25,7 @@ INTERRUPTED, BROKEN_PIPE = 128 + 2, 128 + 13
 PURPOSE = "volref: reference images for GPU volume renderers, with how far from the truth they may be."
 
 EXAMPLES = (
-    ("demo", "start here: a scene, its image and a page that explains them"),
+    ("demo", "start here: a head MRI with its white matter, its error and its time, on one page"),
     ("render scene.json -o image.png", "the image of a scene"),
     ("compare image.png mine.png --diff difference.png", "how far another program's image is from it"),
     ("trace scene.json 120 80", "every number of one ray"),

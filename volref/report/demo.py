@@ -109,6 +109,7 @@ def run_demo(
         "message": figures.sentence,
         "files": [str(paths[name]) for name in FILES],
         "page": str(paths["demo.html"]),
+        "scene": str(DATA / "scene.json"),
         "width": scene.width,
         "height": scene.height,
         **dataclasses.asdict(figures),
