@@ -88,9 +88,7 @@ _HOMES = {
     "volref.truth.result": ("Render",),
     "volref.truth.tracing": ("Trace", "trace"),
 }
-_HOME = dict.fromkeys(__all__, "volref.io") | {
-    name: home for home, names in _HOMES.items() for name in names
-}
+_HOME = dict.fromkeys(__all__, "volref.io") | {name: home for home, names in _HOMES.items() for name in names}
 
 
 def __getattr__(name: str) -> object:

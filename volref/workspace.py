@@ -24,9 +24,9 @@ class Workspace:
         self._buffers: dict[tuple[str, np.dtype[np.generic]], Numbers] = {}
 
     def get(self, name: str, count: int, dtype: np.typing.DTypeLike = np.float64) -> Numbers:
-        """Return the first `count` elements of the buffer `name`; their content is whatever was there."""
+        """Return the first `count` elements of the buffer `name`: what was last written there, or 0."""
         key = name, np.dtype(dtype)
         buffer = self._buffers.get(key)
         if buffer is None or len(buffer) < count:
-            buffer = self._buffers[key] = np.empty(count, key[1])
+            buffer = self._buffers[key] = np.zeros(count, key[1])
         return buffer[:count]

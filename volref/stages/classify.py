@@ -30,6 +30,7 @@ class Table:
     Entry e stands for one linear piece: channel c is `base[c, e] + slope[c, e] (value - start[e])`, with
     red, green, blue and, as the fourth, extinction or opacity (`interpolation`).  `knots` holds the knot
     of each bucket, or, where buckets would be too many (`scale` is None), all distinct knots.
+    Beyond the two values of `visible` the fourth channel is 0.
     """
 
     interpolation: str
@@ -40,6 +41,7 @@ class Table:
     start: Floats
     base: Floats
     slope: Floats
+    visible: tuple[float, float]
 
 
 def lookup_table(transfer: TransferFunction, value_bounds: tuple[float, float]) -> Table:
@@ -47,6 +49,8 @@ def lookup_table(transfer: TransferFunction, value_bounds: tuple[float, float]) 
     strength = transfer.opacity if transfer.extinction is None else transfer.extinction
     channels = np.concatenate([transfer.colors.T, np.asarray(strength)[None]])
     knots, start, base, slope = _pieces(transfer.values, channels)
+    shared = transfer.interpolation, transfer.unit_distance
+    visible = _visible(transfer.values, channels[3])
     low, high = value_bounds
     # The nearest knot on each side of the range counts too: it may share a bucket with one inside.
     near = knots[max(np.searchsorted(knots, low) - 1, 0) : np.searchsorted(knots, high, side="right") + 1]
@@ -55,7 +59,7 @@ def lookup_table(transfer: TransferFunction, value_bounds: tuple[float, float]) 
     width = (high - low) / buckets if high > low else gap / 2
     # A bucket of a few ulp, or one with no finite inverse, could not tell its values apart.
     if buckets > MOST_BUCKETS or width < max(16 * np.spacing(max(abs(low), abs(high))), 1e-300):
-        return Table(transfer.interpolation, transfer.unit_distance, low, None, knots, start, base, slope)
+        return Table(*shared, low, None, knots, start, base, slope, visible)
     # One bucket more on each side takes the values that rounding put outside the bounds.
     edges = low + width * np.arange(-1, buckets + 2)
     below = np.searchsorted(knots, edges[:-1] - width / 4, side="right")
@@ -63,16 +67,18 @@ def lookup_table(transfer: TransferFunction, value_bounds: tuple[float, float]) 
     knot = np.where(has_knot, knots[np.minimum(below, len(knots) - 1)], np.inf)
     knot = np.where(knot <= edges[1:] + width / 4, knot, np.inf)
     entry = np.stack([below, np.where(np.isfinite(knot), below + 1, below)], axis=1).ravel()
-    return Table(
-        transfer.interpolation,
-        transfer.unit_distance,
-        edges[0],
-        1.0 / width,
-        knot,
-        start[entry],
-        np.ascontiguousarray(base[:, entry]),
-        np.ascontiguousarray(slope[:, entry]),
-    )
+    base, slope = np.ascontiguousarray(base[:, entry]), np.ascontiguousarray(slope[:, entry])
+    return Table(*shared, edges[0], 1.0 / width, knot, start[entry], base, slope, visible)
+
+
+def _visible(knots: Floats, strength: Floats) -> tuple[float, float]:
+    """Return the ends of the values that have a strength above 0: the knots just outside, or infinity."""
+    seen = np.flatnonzero(strength)
+    if len(seen) == 0:
+        return np.inf, -np.inf
+    first, last = seen[0], seen[-1]
+    low = knots[first - 1] if first > 0 else -np.inf
+    return low, knots[last + 1] if last + 1 < len(knots) else np.inf
 
 
 def _pieces(values: Floats, channels: Floats) -> tuple[Floats, Floats, Floats, Floats]:
@@ -82,7 +88,9 @@ def _pieces(values: Floats, channels: Floats) -> tuple[Floats, Floats, Floats, F
     at_knot = channels[:, last]
     before_next = channels[:, np.append(first[1:], len(values) - 1)]
     gap = np.append(np.diff(knots), 1.0)
-    slope = (before_next - at_knot) / gap
+    with np.errstate(over="ignore"):
+        slope = (before_next - at_knot) / gap
+    slope[~np.isfinite(slope)] = 0.0  # knots so close that they are a jump
     slope[:, -1] = 0.0
     start = np.concatenate([knots[:1], knots])
     base = np.concatenate([channels[:, :1], at_knot], axis=1)

@@ -28,12 +28,17 @@ from volref.stages.sampling import PAD, Grid, padded_grid, trilinear
 from volref.stages.spans import box_spans, cut_at_surface
 from volref.workspace import Workspace
 
-# Rows of the ray state: first what stays, in index space and world lengths, then what accumulates.
-DIRECTION, ORIGIN, T_NEAR, STEP, LAST = slice(0, 3), slice(3, 6), 6, 7, 8
-TRANSMITTANCE, COLOR = 9, slice(10, 13)
-COARSE_TRANSMITTANCE, COARSE_COLOR = 13, slice(14, 17)
-ACCUMULATED = slice(TRANSMITTANCE, 17)
-ROWS = 17
+# Rows of the ray state.  What stays: where the span begins and how far one segment goes, in padded index
+# space; the length of a segment in the world; the length of the last one as a fraction of that.
+START, STRIDE, STEP, LAST = slice(0, 3), slice(3, 6), 6, 7
+# What accumulates, at the step and at three times the step.
+TRANSMITTANCE, COLOR = 8, slice(9, 12)
+COARSE_TRANSMITTANCE, COARSE_COLOR = 12, slice(13, 16)
+ACCUMULATED = slice(TRANSMITTANCE, 16)
+ROWS = 16
+
+# Where no more than this part of a block's samples is visible, only those are classified.
+MOST_VISIBLE = 0.75
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,10 +102,10 @@ def march_chunk(
     spans = cut_at_surface(box_spans(origins, directions, field.low, field.high), distance)
     counts, steps, last = segments_of(spans, plan.step)
     order = np.argsort(-counts, kind="stable")[: np.count_nonzero(counts)]
-    counts = counts[order]
+    counts, steps = counts[order], steps[order]
     state = np.zeros((ROWS, len(order)))
-    state[DIRECTION], state[ORIGIN] = directions[:, order], origins[:, order]
-    state[T_NEAR : LAST + 1] = spans.t_near[order], steps[order], last[order]
+    state[START] = origins[:, order] + PAD + directions[:, order] * spans.t_near[order]
+    state[STRIDE], state[STEP], state[LAST] = directions[:, order] * steps, steps, last[order] / steps
     state[TRANSMITTANCE] = state[COARSE_TRANSMITTANCE] = 1.0
     samples = _march(field, plan, state, counts, work)
     rgba, bound = behind.copy(), np.zeros(len(pixels))
@@ -138,7 +143,7 @@ def _march(field: Field, plan: Plan, state: Floats, counts: Indices, work: Works
         existing = _longer_than(counts, first)
         live = np.ones(existing, np.bool_)
         if blocks_along is not None:
-            live &= _occupied(*blocks_along, state[:, :existing], first, work)
+            live &= _occupied(*blocks_along, existing, first, work)
         if plan.termination > 0:
             live &= state[TRANSMITTANCE, :existing] >= plan.termination
         if live.all():
@@ -159,7 +164,7 @@ def _longer_than(counts: Indices, segments: int) -> int:
 
 
 def _blocks_along(plan: Plan, rays: Floats) -> tuple[Occupancy, Floats, Floats] | None:
-    """Return the occupancy, and the rays' origins and directions (3, R) counted in its blocks.
+    """Return the occupancy, and the start and stride of rays (3, R) counted in its blocks.
 
     None where all is to be taken for occupied: by the plan, or because a block of segments is longer than
     the reach that the occupancy was made for.
@@ -167,25 +172,22 @@ def _blocks_along(plan: Plan, rays: Floats) -> tuple[Occupancy, Floats, Floats] 
     occupancy = plan.occupancy
     if occupancy is None or plan.step * SEGMENTS_PER_BLOCK / 2 > occupancy.reach:
         return None
-    origins = rays[ORIGIN] / BLOCK + np.array(occupancy.layers)[:, None]
-    return occupancy, origins, rays[DIRECTION] / BLOCK
+    start = (rays[START] - PAD) / BLOCK + np.array(occupancy.layers)[:, None]
+    return occupancy, start, rays[STRIDE] / BLOCK
 
 
 def _occupied(
-    occupancy: Occupancy, origins: Floats, directions: Floats, rays: Floats, first: int, work: Workspace
+    occupancy: Occupancy, start: Floats, stride: Floats, count: int, first: int, work: Workspace
 ) -> Booleans:
-    """Tell which rays (R,) can see something in the block of segments from `first` on.
+    """Tell which of the first `count` rays can see something in the block of segments from `first` on.
 
     The block around the middle of the segments answers for all of them: they lie within its reach.
     """
-    count = rays.shape[1]
-    middle, place = work.get("middle", count), work.get("place in blocks", count)
-    np.multiply(rays[STEP], first + SEGMENTS_PER_BLOCK / 2, out=middle)
-    np.add(middle, rays[T_NEAR], out=middle)
+    place = work.get("place in blocks", count)
     flat, whole = np.zeros(count, np.intp), work.get("whole block", count, np.int32)
     for axis, length in zip((2, 1, 0), occupancy.blocks.shape, strict=True):
-        np.multiply(middle, directions[axis, :count], out=place)
-        np.add(place, origins[axis, :count], out=place)
+        np.multiply(stride[axis, :count], first + SEGMENTS_PER_BLOCK / 2, out=place)
+        np.add(place, start[axis, :count], out=place)
         np.copyto(whole, place, casting="unsafe")
         np.multiply(flat, length, out=flat)
         np.add(flat, whole, out=flat)
@@ -199,7 +201,7 @@ def _march_block(
     opacity, colors = _sample_block(field, step, rays, counts, first, work)
     existing = np.array([_longer_than(counts, first + k) for k in range(SEGMENTS_PER_BLOCK)])
     composite_block(rays[TRANSMITTANCE], rays[COLOR], opacity, colors, existing, work)
-    lengths = (counts - 1 - first) + rays[LAST] / rays[STEP]
+    lengths = (counts - 1 - first) + rays[LAST]
     composite_block_coarse(rays[COARSE_TRANSMITTANCE], rays[COARSE_COLOR], opacity, colors, existing, lengths)
 
 
@@ -211,27 +213,51 @@ def _sample_block(
     Segments beyond a ray's end hold numbers without meaning; compositing leaves them out.
     """
     count = rays.shape[1]
-    t: Floats = work.get("t", SEGMENTS_PER_BLOCK * count).reshape(SEGMENTS_PER_BLOCK, count)
-    middles = np.arange(first, first + SEGMENTS_PER_BLOCK) + 0.5
-    np.multiply(middles[:, None], rays[STEP], out=t)
-    np.add(t, rays[T_NEAR], out=t)
+    shape = SEGMENTS_PER_BLOCK, count
     # The rays that end in this block come last; their lengths differ, from each other and within.
     ending = _longer_than(counts, first + SEGMENTS_PER_BLOCK)
-    t_near, steps, last = rays[T_NEAR : LAST + 1, ending:]
     final, columns = counts[ending:] - 1 - first, np.arange(count - ending)
-    lengths = np.tile(steps, (SEGMENTS_PER_BLOCK, 1))
-    lengths[final, columns] = last
-    t[:, ending:][final, columns] = t_near + (counts[ending:] - 1) * steps + last / 2
-    position: Floats = work.get("position", 3 * t.size).reshape(3, SEGMENTS_PER_BLOCK, count)
-    for axis in range(3):
-        np.multiply(t, rays[DIRECTION][axis], out=position[axis])
-        np.add(position[axis], rays[ORIGIN][axis] + PAD, out=position[axis])
+    last = rays[LAST, ending:]
+    middles = (np.arange(first, first + SEGMENTS_PER_BLOCK) + 0.5)[:, None]
+    last_middles = counts[ending:] - 1 + last / 2
+    position: Floats = work.get("position", 3 * SEGMENTS_PER_BLOCK * count).reshape(3, *shape)
+    for place, start, stride in zip(position, rays[START], rays[STRIDE], strict=True):
+        np.multiply(middles, stride, out=place)
+        place[:, ending:][final, columns] = last_middles * stride[ending:]
+        np.add(place, start, out=place)
     values = trilinear(field.grid, position.reshape(3, -1), work)
-    colors, strength = classify(field.table, values, work)
-    strength = strength.reshape(SEGMENTS_PER_BLOCK, count)
-    segment_opacity(field.table, strength[:, :ending], step)
-    segment_opacity(field.table, strength[:, ending:], lengths)
-    return strength, colors.reshape(3, SEGMENTS_PER_BLOCK, count)
+    opacity, colors = _classified(field.table, values, step, work)
+    opacity, colors = opacity.reshape(shape), colors.reshape(3, *shape)
+    lengths = np.tile(rays[STEP, ending:], (SEGMENTS_PER_BLOCK, 1))
+    lengths[final, columns] *= last
+    ends = values.reshape(shape)[:, ending:].ravel()
+    opacity[:, ending:] = segment_opacity(
+        field.table, classify(field.table, ends, Workspace())[1], lengths.ravel()
+    ).reshape(lengths.shape)
+    return opacity, colors
+
+
+def _classified(table: Table, values: Floats, step: float, work: Workspace) -> tuple[Floats, Floats]:
+    """Return the opacities (n,) of segments `step` long and the colours (3, n) of their values.
+
+    Colours of what is transparent are left as they were: nothing is ever multiplied by them but 0.
+    """
+    low, high = table.visible
+    seen = work.get("seen", len(values), np.bool_)
+    np.greater_equal(values, low, out=seen)
+    seen &= values <= high
+    if np.count_nonzero(seen) > MOST_VISIBLE * len(values):
+        colors, strength = classify(table, values, work)
+        return segment_opacity(table, strength, step), colors
+    chosen = np.flatnonzero(seen)
+    few_colors, strength = classify(table, values[chosen], work)
+    opacity: Floats = work.get("opacity", len(values))
+    colors = work.get("colors", 3 * len(values)).reshape(3, -1)
+    opacity[:] = 0.0
+    opacity[chosen] = segment_opacity(table, strength, step)
+    for color, few in zip(colors, few_colors, strict=True):
+        color[chosen] = few
+    return opacity, colors
 
 
 def _finish(

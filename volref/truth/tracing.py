@@ -134,7 +134,9 @@ def _trace_volume(scene: Scene, plan: Plan, rays: Rays, distance: float, head: d
     counts, steps, last = segments_of(spans, plan.step)
     start = t_near + np.arange(counts[0]) * steps[0]
     length = np.append(np.full(len(start) - 1, steps[0]), last)
-    table = _table(scene, field, start, length, origin, direction)
+    middle = np.arange(counts[0]) + length / steps[0] / 2
+    index = origin + direction * t_near + middle * (direction * steps[0])
+    table = _table(scene, field, start, length, index)
     table["t_end"] = np.append(start[1:], t_far)
     table["position"] = rays.origins[0] + table["t"][:, None] * rays.directions[0]
     transmittance = table["transmittance"][-1] - table["weight"][-1]
@@ -152,14 +154,14 @@ def _checked_pixel(scene: Scene, pixel: Sequence[int]) -> tuple[int, int]:
     return x, whole_number("pixel y", pixel[1], low=0, high=scene.height - 1)
 
 
-def _table(
-    scene: Scene, field: Field, start: Floats, length: Floats, origin: Floats, direction: Floats
-) -> dict[str, Numbers]:
-    """Return the columns of the segments that begin at `start` (S,), but for `position` and `t_end`."""
+def _table(scene: Scene, field: Field, start: Floats, length: Floats, index: Floats) -> dict[str, Numbers]:
+    """Return the columns of the segments that begin at `start` (S,), but for `position` and `t_end`.
+
+    `index` (3, S) are their samples in index space.
+    """
     assert scene.volume is not None
     work = Workspace()
     t = start + length / 2
-    index = origin + direction * t
     cell = np.floor(index)
     value = trilinear(field.grid, index + PAD, work)
     color, strength = classify(field.table, value, work)
