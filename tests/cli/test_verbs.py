@@ -223,7 +223,8 @@ def demo_calls(monkeypatch):
 
     def run_demo(folder, **options):
         calls.append((folder, options))
-        return {"message": "an image of a head", "files": ["d/a.png", "d/a.html"], "page": "d/a.html"}
+        found = {"message": "an image of a head", "files": ["d/a.png", "d/a.html"], "page": "d/a.html"}
+        return {**found, "scene": "s/scene.json"}
 
     monkeypatch.setattr("volref.report.demo.run_demo", run_demo)
     return calls
@@ -232,7 +233,12 @@ def demo_calls(monkeypatch):
 def test_demo_says_what_it_wrote_and_what_to_open(demo_calls, capsys):
     status, out, err = run(capsys, "demo")
     assert (status, err) == (0, "")
-    assert out == "an image of a head\nwrote d/a.png, d/a.html\nopen d/a.html in a browser\n"
+    assert out.splitlines() == [
+        "an image of a head",
+        "wrote d/a.png, d/a.html",
+        "open d/a.html in a browser",
+        "the scene, to try the other verbs on: s/scene.json",
+    ]
     assert demo_calls == [("volref-demo", {"threads": None, "progress": None, "overwrite": False})]
 
 

@@ -365,3 +365,12 @@ def test_importing_colour_makes_no_warning_without_matplotlib_either():
     program += "print(import_colour().__name__)"
     words = [sys.executable, "-W", "error", "-c", program]
     assert subprocess.run(words, capture_output=True, text=True, check=True).stdout == "colour\n"
+
+
+def test_importing_colour_leaves_numpys_print_options_alone():
+    program = (
+        "import numpy as np; before = np.get_printoptions(); "
+        "from volref.oracle.metrics import import_colour; import_colour(); "
+        "assert np.get_printoptions() == before"
+    )
+    subprocess.run([sys.executable, "-c", program], check=True)

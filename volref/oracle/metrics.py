@@ -224,8 +224,11 @@ def delta_e_2000(lab_a: Floats, lab_b: Floats) -> Floats:
 
 
 def import_colour() -> ModuleType:
-    """Return the module `colour` (colour-science), which warns when first imported without Matplotlib."""
-    with warnings.catch_warnings():
+    """Return the module `colour` (colour-science), without its warning and its hold on NumPy.
+
+    When first imported it warns where Matplotlib is missing, and sets NumPy's print options to those of 1.13.
+    """
+    with warnings.catch_warnings(), np.printoptions():
         warnings.simplefilter("ignore")
         import colour
     module: ModuleType = colour
