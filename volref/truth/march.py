@@ -140,7 +140,7 @@ def _march(field: Field, plan: Plan, state: Floats, counts: Indices, work: Works
     most = int(counts[0]) if len(counts) else 0
     blocks_along = _blocks_along(plan, state)
     for first in range(0, most, SEGMENTS_PER_BLOCK):
-        existing = _longer_than(counts, first)
+        existing = int(np.searchsorted(-counts, -first, side="left"))
         live = np.ones(existing, np.bool_)
         if blocks_along is not None:
             live &= _occupied(*blocks_along, existing, first, work)
@@ -156,11 +156,6 @@ def _march(field: Field, plan: Plan, state: Floats, counts: Indices, work: Works
             state[ACCUMULATED, chosen] = part[ACCUMULATED]
             samples += len(chosen) * SEGMENTS_PER_BLOCK
     return samples
-
-
-def _longer_than(counts: Indices, segments: int) -> int:
-    """Return how many rays, sorted by falling `counts`, have more than so many segments."""
-    return int(np.searchsorted(-counts, -segments, side="left"))
 
 
 def _blocks_along(plan: Plan, rays: Floats) -> tuple[Occupancy, Floats, Floats] | None:
@@ -198,42 +193,41 @@ def _march_block(
     field: Field, step: float, rays: Floats, counts: Indices, first: int, work: Workspace
 ) -> None:
     """Sample and composite the segments from `first` on, in place."""
-    opacity, colors = _sample_block(field, step, rays, counts, first, work)
-    existing = np.array([_longer_than(counts, first + k) for k in range(SEGMENTS_PER_BLOCK)])
+    # How many rays have each segment of the block, and the one after it; they come first.
+    existing = np.searchsorted(-counts, -np.arange(first, first + SEGMENTS_PER_BLOCK + 1), side="left")
+    opacity, colors = _sample_block(field, step, rays, counts - first, first, int(existing[-1]), work)
+    existing = existing[:-1]
     composite_block(rays[TRANSMITTANCE], rays[COLOR], opacity, colors, existing, work)
-    lengths = (counts - 1 - first) + rays[LAST]
+    lengths = counts - first - 1 + rays[LAST]
     composite_block_coarse(rays[COARSE_TRANSMITTANCE], rays[COARSE_COLOR], opacity, colors, existing, lengths)
 
 
 def _sample_block(
-    field: Field, step: float, rays: Floats, counts: Indices, first: int, work: Workspace
+    field: Field, step: float, rays: Floats, remaining: Indices, first: int, ending: int, work: Workspace
 ) -> tuple[Floats, Floats]:
     """Return opacity (S, R) and colours (3, S, R) of the segments from `first` on.
 
-    Segments beyond a ray's end hold numbers without meaning; compositing leaves them out.
+    `remaining` (R,) segments are left of each ray; the rays from `ending` on end in this block, and their
+    lengths differ, from each other and within.  Segments beyond a ray's end hold numbers without meaning;
+    compositing leaves them out.
     """
-    count = rays.shape[1]
-    shape = SEGMENTS_PER_BLOCK, count
-    # The rays that end in this block come last; their lengths differ, from each other and within.
-    ending = _longer_than(counts, first + SEGMENTS_PER_BLOCK)
-    final, columns = counts[ending:] - 1 - first, np.arange(count - ending)
+    final, columns = remaining[ending:] - 1, np.arange(len(remaining) - ending)
     last = rays[LAST, ending:]
     middles = (np.arange(first, first + SEGMENTS_PER_BLOCK) + 0.5)[:, None]
-    last_middles = counts[ending:] - 1 + last / 2
-    position: Floats = work.get("position", 3 * SEGMENTS_PER_BLOCK * count).reshape(3, *shape)
+    shape = SEGMENTS_PER_BLOCK, len(remaining)
+    position: Floats = work.get("position", 3 * SEGMENTS_PER_BLOCK * len(remaining)).reshape(3, *shape)
     for place, start, stride in zip(position, rays[START], rays[STRIDE], strict=True):
         np.multiply(middles, stride, out=place)
-        place[:, ending:][final, columns] = last_middles * stride[ending:]
+        place[:, ending:][final, columns] = (first + final + last / 2) * stride[ending:]
         np.add(place, start, out=place)
     values = trilinear(field.grid, position.reshape(3, -1), work)
-    opacity, colors = _classified(field.table, values, step, work)
-    opacity, colors = opacity.reshape(shape), colors.reshape(3, *shape)
     lengths = np.tile(rays[STEP, ending:], (SEGMENTS_PER_BLOCK, 1))
     lengths[final, columns] *= last
-    ends = values.reshape(shape)[:, ending:].ravel()
-    opacity[:, ending:] = segment_opacity(
-        field.table, classify(field.table, ends, Workspace())[1], lengths.ravel()
-    ).reshape(lengths.shape)
+    _, strength = classify(field.table, values.reshape(shape)[:, ending:].ravel(), work)
+    end_opacity = segment_opacity(field.table, strength.reshape(lengths.shape), lengths).copy()
+    opacity, colors = _classified(field.table, values, step, work)
+    opacity, colors = opacity.reshape(shape), colors.reshape(3, *shape)
+    opacity[:, ending:] = end_opacity
     return opacity, colors
 
 
