@@ -24,7 +24,9 @@ def classified(transfer, values, bounds=None):
 @st.composite
 def transfer_functions(draw):
     """Transfer functions with knots anywhere, close together, and doubled to jumps."""
-    positions = draw(st.lists(st.floats(-100, 100), min_size=1, max_size=12, unique=True))
+    positions = draw(
+        st.lists(st.floats(-100, 100, allow_subnormal=False), min_size=1, max_size=12, unique=True)
+    )
     jumps = draw(st.lists(st.sampled_from(positions), max_size=3, unique=True))
     close = [p + 1e-6 for p in draw(st.lists(st.sampled_from(positions), max_size=2, unique=True))]
     knots = sorted({*positions, *close})
@@ -152,3 +154,9 @@ def test_a_background_exactly_at_the_foot_of_a_ramp_is_not_visible():
     transfer = TransferFunction([0, 1], np.ones((2, 3)), [0, 1])
     assert not transfer.is_visible(0.0, 0.0)
     assert transfer.is_visible(0.0, 1e-12)
+
+
+def test_knots_so_close_that_their_slope_overflows_are_a_jump():
+    transfer = TransferFunction([0.0, 5e-324, 1.0], np.ones((3, 3)), [0.0, 1.0, 2.0])
+    _, strength = classified(transfer, [0.0, 5e-324, 0.5])
+    assert strength.tolist() == [0.0, 1.0, 1.5]
