@@ -160,3 +160,13 @@ def test_knots_so_close_that_their_slope_overflows_are_a_jump():
     transfer = TransferFunction([0.0, 5e-324, 1.0], np.ones((3, 3)), [0.0, 1.0, 2.0])
     _, strength = classified(transfer, [0.0, 5e-324, 0.5])
     assert strength.tolist() == [0.0, 1.0, 1.5]
+
+
+@given(transfer=transfer_functions(), more=st.lists(st.floats(-120, 120), min_size=1, max_size=20))
+def test_what_is_seen_lies_within_the_visible_values(transfer, more):
+    values = np.concatenate([more, transfer.values, (transfer.values[1:] + transfer.values[:-1]) / 2])
+    bounds = float(values.min()), float(values.max())
+    low, high = lookup_table(transfer, bounds).visible
+    _, strength = classified(transfer, values)
+    seen = values[strength > 0]
+    assert ((seen >= low) & (seen <= high)).all()
