@@ -25,7 +25,7 @@ def layers_of_the_page():
 def layers_of_the_contract():
     settings = tomllib.loads((DOCS.parent / "pyproject.toml").read_text(encoding="utf-8"))
     contract = next(c for c in settings["tool"]["importlinter"]["contracts"] if c["type"] == "layers")
-    return [{name.strip().removeprefix("volref.") for name in row.split(":")} for row in contract["layers"]]
+    return [{name.strip().removeprefix("volref.") for name in row.split("|")} for row in contract["layers"]]
 
 
 def test_the_tree_names_what_is_there_and_nothing_else():
