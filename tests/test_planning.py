@@ -65,7 +65,7 @@ def test_everything_forces_all_that_was_left_out():
     everything = vr.plan(scene).everything()
     assert everything.occupancy is None
     assert everything.termination == 0.0
-    assert all(s.included for s in everything.stages if s.name not in ("empty space", "early termination"))
+    assert [s.name for s in everything.stages if s.included] == ["volume"]
     np.testing.assert_array_equal(vr.render(scene, plan=everything).rgba, vr.render(scene).rgba)
 
 
@@ -90,3 +90,31 @@ def test_a_step_that_is_no_length_is_refused(step):
 def test_an_unknown_method_is_refused():
     with pytest.raises(vr.SceneError, match="method must be 'march', got 'euler'"):
         vr.plan(rough_scene(), method="euler")
+
+
+@pytest.mark.parametrize("step", [1e-310, 1e-300, 1e-9])
+def test_a_step_that_would_never_end_is_refused(step):
+    with pytest.raises(vr.SceneError, match="step must take at most 2147483648 samples"):
+        vr.plan(rough_scene(), step=step)
+
+
+def test_what_the_scene_does_not_have_cannot_be_forced_in():
+    scene = rough_scene()
+    assert not vr.plan(scene).everything().includes("meshes")
+    clear = dataclasses.replace(scene, transfer=vr.TransferFunction([0], [(1, 1, 1)], [0]))
+    assert not vr.plan(clear).includes("volume")
+    assert vr.plan(clear).everything().includes("volume")
+    assert vr.render(clear, plan=vr.plan(clear).everything()).samples > 0
+
+
+def test_a_range_that_ends_at_the_foot_of_a_ramp_counts_as_seen_since_rounding_may_pass_it():
+    transfer = vr.TransferFunction([0.3, 1.0], [(1, 1, 1)] * 2, [0.0, 1.0])
+    values = np.full((8, 8, 32), 0.1)
+    values[:, :, :4] = 0.3
+    volume = vr.Volume(values)
+    scene = vr.Scene(volume, transfer, camera_towards(volume), 4, 4)
+    plan = vr.plan(scene)
+    assert plan.includes("volume")
+    assert plan.occupancy.blocks.any()
+    flat = vr.Volume(np.full((8, 8, 32), 0.3))  # one value is interpolated without rounding
+    assert not vr.plan(vr.Scene(flat, transfer, camera_towards(flat), 4, 4)).includes("volume")

@@ -22,6 +22,10 @@ Numbers: TypeAlias = NDArray[Any]
 
 Vector: TypeAlias = tuple[float, float, float]
 
+# World coordinates and lengths lie within these: their products of up to four factors stay finite.
+LARGEST_LENGTH = 1e60
+LEAST_LENGTH = 1e-60
+
 # A shape rule is a tuple of lengths in which a name such as "V" stands for any length.
 ShapeRule: TypeAlias = tuple[int | str, ...]
 
@@ -32,13 +36,32 @@ def set_fields(record: object, **fields: object) -> None:
         object.__setattr__(record, name, value)
 
 
-def float_array(name: str, value: ArrayLike | None, shape: ShapeRule) -> Floats:
+def plain_array(name: str, value: ArrayLike | None) -> Numbers:
+    """Return `value` as an array of one shape, without a copy where it is one already.
+
+    Raises
+    ------
+    SceneError
+        If it is ragged, or a masked array: what its masked elements are worth is for the caller to say.
+    """
+    if isinstance(value, np.ma.MaskedArray):
+        message = f"{name} must be a plain array, got a masked one; say what the masked elements are worth "
+        raise SceneError(message + "with .filled(VALUE)")
+    try:
+        return np.asanyarray(value)
+    except ValueError as error:
+        message = f"{name} must be an array, got rows of different lengths; give every row the same length"
+        raise SceneError(message) from error
+
+
+def float_array(name: str, value: ArrayLike | None, shape: ShapeRule, *, limit: float = math.inf) -> Floats:
     """Return a read-only float64 copy of `value` after checking its shape and that it is finite.
 
     Raises
     ------
     SceneError
-        If `value` is not numbers, has another shape than `shape`, or holds NaN or infinity.
+        If `value` is not numbers, has another shape than `shape`, holds NaN or infinity, or a number beyond
+        `limit` on either side of 0.
 
     Examples
     --------
@@ -49,8 +72,10 @@ def float_array(name: str, value: ArrayLike | None, shape: ShapeRule) -> Floats:
     volref.errors.SceneError: camera.eye must have shape (3), got (2); give 3 numbers
     """
     try:
-        array = np.array(value, dtype=np.float64, order="C")
-    except (TypeError, ValueError) as error:
+        array = np.array(plain_array(name, value), dtype=np.float64, order="C")
+    except SceneError:
+        raise
+    except (TypeError, ValueError, OverflowError) as error:
         message = f"{name} must be numbers of shape {_spell(shape)}, got {type(value).__name__}; "
         raise SceneError(message + "give a list or an array of numbers") from error
     if not _shape_fits(array.shape, shape):
@@ -62,6 +87,9 @@ def float_array(name: str, value: ArrayLike | None, shape: ShapeRule) -> Floats:
         where = tuple(int(i) for i in np.argwhere(~finite)[0])
         message = f"{name} must be finite, got {array[where]} at index {_spell(where)}; "
         raise SceneError(message + "remove or replace it")
+    if array.size and np.abs(array).max() > limit:
+        message = f"{name} must lie within {limit:g} of 0, got {np.abs(array).max():g}; "
+        raise SceneError(message + "use another unit of length")
     array.flags.writeable = False
     return array
 
@@ -86,8 +114,8 @@ def number(
     """
     try:
         result = float(value)  # type: ignore[arg-type]
-    except (TypeError, ValueError) as error:
-        message = f"{name} must be a number, got {value!r}; give one finite number"
+    except (TypeError, ValueError, OverflowError) as error:
+        message = f"{name} must be a number, got {_short(value)}; give one finite number"
         raise SceneError(message) from error
     if not math.isfinite(result):
         message = f"{name} must be finite, got {result}; give one finite number"
@@ -123,7 +151,7 @@ def whole_number(name: str, value: object, *, low: int, high: int) -> int:
     except TypeError:
         result = None
     if result is None or isinstance(value, bool) or not low <= result <= high:
-        message = f"{name} must be a whole number from {low} to {high}, got {value!r}; change it"
+        message = f"{name} must be a whole number from {low} to {high}, got {_short(value)}; change it"
         raise SceneError(message)
     return result
 
@@ -144,9 +172,19 @@ def one_of(name: str, value: object, choices: tuple[str, ...]) -> str:
     """
     if not isinstance(value, str) or value not in choices:
         rule = " or ".join(repr(choice) for choice in choices)
-        message = f"{name} must be {rule}, got {value!r}; choose one"
+        message = f"{name} must be {rule}, got {_short(value)}; choose one"
         raise SceneError(message)
     return value
+
+
+def _short(value: object) -> str:
+    """Return how a value is written, cut where nobody reads on."""
+    words = f"10^{len(str(value)) - 1}" if _is_huge(value) else repr(value)
+    return words if len(words) <= 60 else words[:57] + "..."
+
+
+def _is_huge(value: object) -> bool:
+    return isinstance(value, int) and abs(value) >= 10**18
 
 
 def _shape_fits(shape: tuple[int, ...], rule: ShapeRule) -> bool:

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from volref.arrays import Booleans, number
+from volref.arrays import Booleans, Floats, number
 from volref.errors import SceneError
 from volref.scene.blocks import block_ranges
 from volref.scene.scene import Scene
@@ -34,6 +34,9 @@ RAYS_PER_CHUNK = 16384
 
 # Above this many samples on one ray the default step is refused rather than left to run for hours.
 MOST_DEFAULT_SEGMENTS = 1 << 20
+
+# And above this many any step is: 2^31 samples take a minute and a half on one ray.
+MOST_SEGMENTS = 1 << 31
 
 # Skipping costs one look-up per block of segments; with fewer empty blocks than this it does not pay.
 LEAST_EMPTY_PART = 0.05
@@ -67,6 +70,8 @@ class Plan:
 
     Parameters
     ----------
+    scene
+        The scene it was made for; it holds for other cameras, image sizes and backgrounds too.
     method
         "march": midpoint rule at a uniform step.
     step
@@ -83,6 +88,7 @@ class Plan:
         Each stage, in or out, and why.
     """
 
+    scene: Scene = field(repr=False)
     method: str
     step: float
     tolerance: float
@@ -96,16 +102,33 @@ class Plan:
         return any(stage.name == name and stage.included for stage in self.stages)
 
     def everything(self) -> "Plan":
-        """Return this plan with what was left out forced in, to prove that leaving it out changes nothing."""
-        stages = tuple(
-            stage if stage.included else Stage(stage.name, included=True, reason="forced in")
-            for stage in self.stages
-        )
-        stages = tuple(
-            Stage(stage.name, included=False, reason="forced off") if stage.name in SHORTCUTS else stage
-            for stage in stages
-        )
+        """Return this plan with what was left out forced in, to prove that leaving it out changes nothing.
+
+        Every part that the scene has takes part, and nothing is skipped or ended early.
+        """
+        stages = tuple(self._forced(stage) for stage in self.stages)
         return dataclasses.replace(self, termination=0.0, occupancy=None, stages=stages)
+
+    def _forced(self, stage: Stage) -> Stage:
+        if stage.name in SHORTCUTS:
+            return Stage(stage.name, included=False, reason="forced off")
+        if stage.name == "volume" and not stage.included and self.scene.volume is not None:
+            return Stage(stage.name, included=True, reason="forced in")
+        return stage
+
+    def check(self, scene: Scene) -> None:
+        """Refuse another scene than the one it was made for: what may be left out there is not known.
+
+        Raises
+        ------
+        SceneError
+            If volume, transfer function or the presence of meshes differ.
+        """
+        mine = self.scene
+        same = mine.volume is scene.volume and mine.transfer is scene.transfer
+        if not same or bool(mine.meshes) != bool(scene.meshes):
+            message = "plan must be one for this scene, got the plan of another volume, transfer function or "
+            raise SceneError(message + "meshes; make one with volref.plan(scene)")
 
     def as_dict(self) -> dict[str, Any]:
         """Return the plan as plain data for JSON."""
@@ -145,9 +168,12 @@ def plan(
     Raises
     ------
     SceneError
-        If the method is unknown, the step is not positive, or the default step would take more than
-        2^20 samples on one ray.
+        If the method is unknown, the step is not positive, or it would take more than 2^31 samples on one
+        ray (2^20 for the default step).
     """
+    if not isinstance(scene, Scene):
+        message = f"scene must be a volref.Scene, got {type(scene).__name__}; build or load one first"
+        raise SceneError(message)
     if method != "march":
         message = f"method must be 'march', got {method!r}; this version has no other"
         raise SceneError(message)
@@ -155,17 +181,17 @@ def plan(
     stages = [_meshes_stage(scene)]
     if scene.volume is None or scene.transfer is None:
         stages.append(Stage("volume", included=False, reason="the scene has none"))
-        return Plan(method, 0.0, tolerance, 0.0, 0, None, (*stages, _background_stage(scene)))
+        return Plan(scene, method, 0.0, tolerance, 0.0, 0, None, (*stages, _background_stage(scene)))
     length, most_segments = _step_length(scene.volume, step)
-    seen = bool(scene.transfer.is_visible(*scene.volume.value_bounds))
+    seen = bool(_may_be_seen(scene.transfer, *map(np.array, scene.volume.value_bounds)))
     stages.append(_volume_stage(scene.volume, seen=seen))
     if not seen:
-        return Plan(method, length, tolerance, 0.0, 0, None, (*stages, _background_stage(scene)))
+        return Plan(scene, method, length, tolerance, 0.0, 0, None, (*stages, _background_stage(scene)))
     occupancy, stage = _empty_space(scene.volume, scene.transfer, length)
     stages.append(stage)
     termination, stage = _early_termination(scene.volume, scene.transfer)
     stages.extend([stage, _background_stage(scene)])
-    return Plan(method, length, tolerance, termination, most_segments, occupancy, tuple(stages))
+    return Plan(scene, method, length, tolerance, termination, most_segments, occupancy, tuple(stages))
 
 
 def _meshes_stage(scene: Scene) -> Stage:
@@ -197,12 +223,16 @@ def _volume_stage(volume: Volume, *, seen: bool) -> Stage:
 def _step_length(volume: Volume, step: float | None) -> tuple[float, int]:
     diagonal = _diagonal(volume)
     length = min(volume.spacing) / 2 if step is None else number("step", step, above=0)
-    most_segments = math.ceil(diagonal / length)
-    if step is None and most_segments > MOST_DEFAULT_SEGMENTS:
+    if step is None and diagonal > length * MOST_DEFAULT_SEGMENTS:
         message = f"step must be stated for this volume, got the default {length:g}, half the least spacing, "
-        message += f"which takes {most_segments:.3g} samples on a ray of length {diagonal:.3g}; pass step="
+        message += (
+            f"which takes {diagonal / length:.3g} samples on a ray of length {diagonal:.3g}; pass step="
+        )
         raise SceneError(message)
-    return length, most_segments
+    if diagonal > length * MOST_SEGMENTS:
+        message = f"step must take at most {MOST_SEGMENTS} samples on a ray of length {diagonal:.3g}, got "
+        raise SceneError(message + f"{length:g}; make it longer than {diagonal / MOST_SEGMENTS:.3g}")
+    return length, math.ceil(diagonal / length)
 
 
 def _diagonal(volume: Volume) -> float:
@@ -220,9 +250,7 @@ def _empty_space(volume: Volume, transfer: TransferFunction, step: float) -> tup
     if max(x, y, z) > max(volume.size):
         return None, Stage(name, included=False, reason="one block of segments is longer than the volume")
     low, high = block_ranges(volume, BLOCK, (x, y, z))
-    # Interpolation may leave the range of its corners by rounding, unless they are all one value.
-    slack = np.where(high > low, 8 * np.finfo(np.float64).eps * np.maximum(abs(low), abs(high)), 0.0)
-    occupied = transfer.is_visible(low - slack, high + slack)
+    occupied = _may_be_seen(transfer, low, high)
     empty = 1 - float(occupied.mean())
     saved = f"{empty:.0%} of the {BLOCK}^3 blocks are transparent with their surroundings"
     if empty < LEAST_EMPTY_PART:
@@ -231,6 +259,15 @@ def _empty_space(volume: Volume, transfer: TransferFunction, step: float) -> tup
     layers = (1 + x // BLOCK, 1 + y // BLOCK, 1 + z // BLOCK)
     blocks = np.pad(occupied, [(layers[axis], layers[axis]) for axis in (2, 1, 0)], mode="edge")
     return Occupancy(blocks, layers, half), Stage(name, included=True, reason=f"{saved}: no samples there")
+
+
+def _may_be_seen(transfer: TransferFunction, low: Floats, high: Floats) -> Booleans:
+    """Tell whether anything interpolated between samples from `low` to `high` can have an opacity above 0.
+
+    Interpolation may leave the range of its corners by rounding, unless they are all one value.
+    """
+    slack = np.where(high > low, 8 * np.finfo(np.float64).eps * np.maximum(abs(low), abs(high)), 0.0)
+    return transfer.is_visible(low - slack, high + slack)
 
 
 def _early_termination(volume: Volume, transfer: TransferFunction) -> tuple[float, Stage]:

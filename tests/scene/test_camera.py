@@ -74,3 +74,12 @@ def test_aspect_must_agree_with_the_image():
     rounded.check_aspect(400, 200)
     with pytest.raises(SceneError, match="aspect of the image, got 2 for 300 x 200"):
         given.check_aspect(300, 200)
+
+
+@pytest.mark.parametrize("number", [10**400, 1e300])
+def test_numbers_too_large_for_a_length_are_refused_in_a_short_sentence(number):
+    with pytest.raises(SceneError, match=r"camera\.eye must") as refusal:
+        Camera.look_at((number, 0, 0), (0, 0, 0), (0, 0, 1), 40.0, 0.5, 20.0)
+    assert len(str(refusal.value)) < 200
+    with pytest.raises(SceneError, match=r"camera\.near must be"):
+        Camera.look_at((5, 0, 0), (0, 0, 0), (0, 0, 1), 40.0, 10**400, 20.0)

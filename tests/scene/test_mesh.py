@@ -48,3 +48,16 @@ def test_a_texture_of_bytes_is_divided_by_255_and_never_decoded():
     mesh = Mesh(QUAD, HALVES, uv=[(0, 0), (1, 0), (1, 1), (0, 1)], texture=texture)
     assert mesh.coloring == "texture"
     assert (mesh.texture == 0.2).all()
+
+
+@pytest.mark.parametrize(
+    ("faces", "more"),
+    [
+        ([[0, 1, 2], [0, 1]], {}),
+        (HALVES, {"colors": [[0, 0, 1], [0, 1]]}),
+        (HALVES, {"uv": [(0, 0)] * 4, "texture": [[[0, 0, 1]], [[0, 0, 1], [0, 0, 1]]]}),
+    ],
+)
+def test_ragged_rows_are_refused_in_one_sentence(faces, more):
+    with pytest.raises(SceneError, match="must be an array, got rows of different lengths"):
+        Mesh(QUAD, faces, **more)

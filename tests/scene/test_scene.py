@@ -36,3 +36,16 @@ def test_a_straight_background_is_recognised_where_it_can_be():
     with pytest.raises(SceneError, match=r"must be premultiplied"):
         rough_scene(background=(1, 1, 1, 0))
     assert rough_scene(background=np.array([2, 2, 2, 1])).background == (2, 2, 2, 1)
+
+
+@pytest.mark.parametrize("width", [10**400, 4.0, "4", True])
+def test_sizes_are_whole_numbers(width):
+    with pytest.raises(SceneError, match=r"scene.width must be a whole number") as refusal:
+        rough_scene(width=width)
+    assert len(str(refusal.value)) < 200
+
+
+def test_meshes_are_a_list():
+    scene = rough_scene()
+    with pytest.raises(SceneError, match=r"scene.meshes must be a list of meshes, got NoneType"):
+        dataclasses.replace(scene, meshes=None)

@@ -76,3 +76,29 @@ def test_block_ranges_bound_every_value_within_their_reach(shape, block, reach, 
             corner = [(upper if bit else lower)[axis] for axis, bit in enumerate((x, y, z))]
             sample = volume.values[corner[2], corner[1], corner[0]]
             assert low[b[2], b[1], b[0]] <= sample <= high[b[2], b[1], b[0]]
+
+
+@pytest.mark.parametrize(("dtype", "value"), [(np.float16, 1e10), (np.float32, 1e39)])
+def test_a_replacement_that_the_type_cannot_hold_is_refused(dtype, value):
+    values = np.full((2, 2, 2), np.nan, dtype)
+    with pytest.raises(SceneError, match=f"volume.nan must be a finite {np.dtype(dtype)}"):
+        Volume(values, nan=value)
+
+
+@pytest.mark.parametrize("dtype", [float, int])
+def test_masked_arrays_are_refused_since_nobody_said_what_the_mask_means(dtype):
+    values = np.ma.masked_equal(np.arange(8, dtype=dtype).reshape(2, 2, 2), 3)
+    with pytest.raises(SceneError, match=r"got a masked one; say .* with \.filled\(VALUE\)"):
+        Volume(values)
+    assert Volume(values.filled(0)).values[0, 1, 1] == 0
+
+
+def test_ragged_rows_are_refused_in_one_sentence():
+    with pytest.raises(SceneError, match=r"volume.values must be an array, got rows of different lengths"):
+        Volume([[[1, 2], [3]]])
+
+
+@pytest.mark.parametrize("spacing", [1e-200, 1e200])
+def test_lengths_whose_squares_overflow_are_refused(spacing):
+    with pytest.raises(SceneError, match=r"volume.spacing must"):
+        Volume(np.zeros((2, 2, 2)), spacing=(1, 1, spacing))

@@ -77,18 +77,24 @@ def test_the_matrices_of_a_camera_give_back_its_rays(kind, clip_z):
     np.testing.assert_allclose(first.directions, second.directions, rtol=0, atol=4e-16)
 
 
-def test_projected_points_lie_on_the_rays_of_their_pixels():
-    matrix = np.array([[1.5, 0.1, 0.2, 0], [0, 2.0, -0.3, 0], [0, 0, -1.02, -0.2], [0, 0, -1, 0]])
+@pytest.mark.parametrize("last_row", [(0, 0, -1, 0), (0, 0, 0, 1)])
+def test_projected_points_lie_on_the_rays_of_their_pixels(last_row):
+    # Off-centre, sheared, and for parallel rays oblique.
+    matrix = np.array([[1.5, 0.1, 0.2, 0], [0, 2.0, -0.3, 0], [0, 0, -1.02, -0.2], last_row])
     view = Camera.look_at((3, 1, 2), (0, 0.5, 0), (0.1, 1, 0), 35.0, 0.5, 20.0).view_from_world
     width, height = 4, 3
     matrix[0, :2] *= 2.0 / np.linalg.norm(matrix[0, :2]) * height / width
     camera = Camera.from_matrices(view, matrix)
     rays = pixel_rays(camera, width, height, all_pixels(width, height))
-    points = np.c_[rays.origins + 7.0 * rays.directions, np.ones(12)] @ (matrix @ view).T
-    # off-centre and sheared: a handful of roundings of numbers near 10
-    np.testing.assert_allclose(
-        points[:, :2] / points[:, 3:], pixel_ndc(width, height, all_pixels(4, 3)), atol=1e-14
-    )
+    ndc = pixel_ndc(width, height, all_pixels(width, height))
+    for distance in (0.0 if camera.is_parallel else 0.5, 7.0):
+        points = np.c_[rays.origins + distance * rays.directions, np.ones(12)] @ (matrix @ view).T
+        # a handful of roundings of numbers near 10
+        np.testing.assert_allclose(points[:, :2] / points[:, 3:], ndc, rtol=0, atol=1e-14)
+    np.testing.assert_allclose(np.linalg.norm(rays.directions, axis=1), 1.0, rtol=0, atol=4e-16)
+    if camera.is_parallel:  # they start on the near plane
+        depth = -(rays.origins @ view[2, :3] + view[2, 3])
+        np.testing.assert_allclose(depth, camera.near, rtol=0, atol=1e-14)
 
 
 @pytest.mark.parametrize("build", [Camera.look_at, Camera.orthographic])

@@ -4,6 +4,7 @@ In a homogeneous box a ray that meets the surface at distance d has the image c 
 with L = min(d, t_far) - t_near.  d is that of the faceted sphere, by brute force over all its triangles.
 """
 
+import dataclasses
 import math
 
 import numpy as np
@@ -13,6 +14,7 @@ import volref as vr
 from tests.oracles import scalar
 from tests.oracles.moller_trumbore import first_hits
 from volref.phantoms.meshes import box_mesh, sphere_mesh
+from volref.scene.camera import look_at_matrix
 
 EXTINCTION, COLOR, SURFACE = 0.35, np.array([0.9, 0.5, 0.25]), np.array([0.1, 0.8, 0.3])
 BACKGROUND = np.array([0.05, 0.02, 0.1, 0.4])
@@ -87,14 +89,42 @@ def test_the_integral_ends_exactly_at_the_surface_whatever_the_step(step):
     assert error <= 1e-11  # as above
 
 
-def test_a_mesh_face_in_the_face_of_the_box_leaves_the_volume_whole_from_behind_and_hides_it_from_before():
-    # The box mesh has the very faces of the volume: seen from outside its front hides all of it.
+def test_a_mesh_with_the_faces_of_the_box_hides_the_volume_from_outside():
     scene = box_scene([box_mesh((7, 6, 5), (3.0, 2.5, 2.0), colors=SURFACE)])
     out = vr.render(scene)
     hit = np.isfinite(out.distance)
     assert hit.sum() > 100
     # Mesh and box agree to an ulp of the distance, so at most that much of the volume lies before the mesh.
     np.testing.assert_allclose(out.rgba[hit], np.tile([*SURFACE, 1.0], (hit.sum(), 1)), rtol=0, atol=1e-13)
+
+
+def test_a_plane_in_the_far_face_of_the_box_leaves_the_volume_before_it_whole():
+    wall = vr.Mesh(
+        [(-0.5, -0.5, -0.5), (6.5, -0.5, -0.5), (6.5, 5.5, -0.5), (-0.5, 5.5, -0.5)],
+        [(0, 1, 2), (0, 2, 3)],
+        colors=SURFACE,
+    )
+    scene = box_scene([wall])
+    error, near_an_edge, hits = largest_error(scene, vr.render(scene))
+    assert error <= 1e-11  # as above
+    assert near_an_edge <= 2
+    assert hits > 50
+
+
+def test_oblique_parallel_rays_meet_mesh_and_volume_in_the_same_place():
+    # A cabinet projection: the mesh has the faces of the box, so one hides the other wherever either is seen.
+    matrix = [[0.15, 0, 0.05, 0], [0, 0.15, 0.04, 0], [0, 0, -0.02, -1], [0, 0, 0, 1]]
+    view = look_at_matrix(EYE, TARGET, (0, 0, 1))
+    camera = vr.Camera.from_matrices(view, matrix)
+    mesh = box_mesh((7, 6, 5), (3.0, 2.5, 2.0), colors=SURFACE)
+    volume_alone = vr.Scene(box_scene([]).volume, box_scene([]).transfer, camera, 40, 40)
+    both = dataclasses.replace(volume_alone, meshes=(mesh,))
+    seen = vr.render(volume_alone).rgba[..., 3] > 0
+    out = vr.render(both)
+    assert seen.sum() > 100
+    assert (np.isfinite(out.distance) == seen).mean() > 0.999  # outlines of one and the other may round apart
+    hit = np.isfinite(out.distance)
+    np.testing.assert_allclose(out.rgba[hit], np.tile([*SURFACE, 1.0], (hit.sum(), 1)), rtol=0, atol=1e-12)
 
 
 def test_distance_is_that_of_the_nearest_mesh_of_several():

@@ -1,6 +1,7 @@
 """`volref compare`: how far apart two images are."""
 
 import argparse
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from volref.cli.options import add_force, add_json, add_limit, fraction, read_limit
@@ -35,8 +36,11 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 def _run(options: argparse.Namespace) -> int:
     from volref.arrays import number
     from volref.io import read_image
+    from volref.io.atomic import check_free
     from volref.oracle import metrics
 
+    if options.diff:
+        check_free(Path(options.diff), overwrite=options.force)  # before the work, and before any output
     encoding = "none" if options.codes else None
     a, b = (read_image(path, encoding=encoding, **read_limit(options)) for path in (options.a, options.b))
     found = metrics.compare(a, b, encoding="srgb" if options.codes else "linear")

@@ -19,7 +19,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from volref.arrays import Floats, float_array, number, one_of, set_fields
+from volref.arrays import LARGEST_LENGTH, LEAST_LENGTH, Floats, float_array, number, one_of, set_fields
 from volref.errors import SceneError
 from volref.scene.transform import affine, invert_affine
 
@@ -71,11 +71,11 @@ class Camera:
     ) -> None:
         one_of("camera.kind", kind, ("perspective", "orthographic", "matrix"))
         one_of("camera.clip_z", clip_z, CLIP_RANGES)
-        view = float_array("camera.view_from_world", view_from_world, (4, 4))
+        view = float_array("camera.view_from_world", view_from_world, (4, 4), limit=LARGEST_LENGTH)
         invert_affine("camera.view_from_world", view)
         clip = None
         if kind == "matrix":
-            clip = float_array("camera.clip_matrix", clip_matrix, (4, 4))
+            clip = float_array("camera.clip_matrix", clip_matrix, (4, 4), limit=LARGEST_LENGTH)
             planes = _planes_of(clip, clip_z)
             parallel = bool(clip[3, 3])
         else:
@@ -87,7 +87,7 @@ class Camera:
             view_from_world=view,
             kind=kind,
             fov_y=_checked_angle(fov_y) if kind == "perspective" else None,
-            height=number("camera.height", height, above=0) if kind == "orthographic" else None,
+            height=_checked_height(height) if kind == "orthographic" else None,
             near=planes[0],
             far=planes[1],
             clip_matrix=clip,
@@ -213,14 +213,14 @@ def look_at_matrix(eye: ArrayLike, target: ArrayLike, up: ArrayLike) -> Floats:
     Traceback (most recent call last):
     volref.errors.SceneError: camera.up must not be parallel to the view, got (0, 0, 1); choose another up
     """
-    eye_point = float_array("camera.eye", eye, (3,))
-    forward = float_array("camera.target", target, (3,)) - eye_point
+    eye_point = float_array("camera.eye", eye, (3,), limit=LARGEST_LENGTH)
+    forward = float_array("camera.target", target, (3,), limit=LARGEST_LENGTH) - eye_point
     distance = np.linalg.norm(forward)
     if distance == 0:
         message = f"camera.target must differ from camera.eye, got {target!r} for both; move one"
         raise SceneError(message)
     forward = forward / distance
-    up_vector = float_array("camera.up", up, (3,))
+    up_vector = float_array("camera.up", up, (3,), limit=LARGEST_LENGTH)
     right = np.cross(forward, up_vector)
     # The sine of the angle between them: below 1e-9 fewer than 7 digits of `right` are left.
     if np.linalg.norm(right) <= 1e-9 * np.linalg.norm(up_vector):
@@ -239,6 +239,12 @@ def _checked_angle(fov_y: float | None) -> float:
     return angle
 
 
+def _checked_height(height: float | None) -> float:
+    return number(
+        "camera.height", number("camera.height", height, above=0), low=LEAST_LENGTH, high=LARGEST_LENGTH
+    )
+
+
 def _check_planes(near: float, far: float, *, parallel: bool) -> None:
     if not parallel:
         number("camera.near", near, above=0)
@@ -251,7 +257,8 @@ def _planes_of(clip: Floats, clip_z: str) -> tuple[float, float]:
     """Return (near, far) of a projection matrix, after checking that it is one.
 
     A perspective matrix has the last row (0, 0, -1, 0), a parallel one (0, 0, 0, 1); the first two rows
-    may shift and shear the image (off-centre frusta), the third only scales and shifts z.
+    may shift and shear the image (off-centre frusta, oblique parallel rays), the third only scales and
+    shifts z.
     """
     perspective = np.array_equal(clip[3], (0, 0, -1, 0))
     parallel = np.array_equal(clip[3], (0, 0, 0, 1))

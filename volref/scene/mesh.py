@@ -9,7 +9,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from volref.arrays import Booleans, Floats, Integers, Numbers, float_array, one_of, set_fields
+from volref.arrays import (
+    LARGEST_LENGTH,
+    Booleans,
+    Floats,
+    Integers,
+    Numbers,
+    float_array,
+    one_of,
+    plain_array,
+    set_fields,
+)
 from volref.errors import SceneError
 
 
@@ -65,7 +75,7 @@ class Mesh:
         wrap: str = "repeat",
         coloring: str | None = None,
     ) -> None:
-        points = float_array("mesh.vertices", vertices, ("V", 3))
+        points = float_array("mesh.vertices", vertices, ("V", 3), limit=LARGEST_LENGTH)
         corners = _checked_faces(faces, len(points))
         keep = ~degenerate(points, corners)
         if not keep.any():
@@ -106,7 +116,7 @@ def degenerate(vertices: Floats, faces: Integers) -> Booleans:
 
 
 def _checked_faces(faces: ArrayLike, vertices: int) -> Integers:
-    array = np.asarray(faces)
+    array = plain_array("mesh.faces", faces)
     if array.ndim != 2 or array.shape[1] != 3 or array.dtype.kind not in "iu" or len(array) == 0:
         message = f"mesh.faces must be at least one row of 3 whole numbers, got {array.dtype} of shape "
         raise SceneError(message + f"{array.shape}; triangulate the mesh and give vertex indices")
@@ -119,7 +129,8 @@ def _checked_faces(faces: ArrayLike, vertices: int) -> Integers:
 
 
 def _checked_colors(colors: ArrayLike) -> Floats:
-    array = float_array("mesh.colors", colors, (3,) if np.ndim(colors) == 1 else ("N", 3))
+    given = plain_array("mesh.colors", colors)
+    array = float_array("mesh.colors", given, (3,) if given.ndim == 1 else ("N", 3))
     if (array < 0).any():
         message = f"mesh.colors must be at least 0, got {array.min():g}; raise them to 0"
         raise SceneError(message)
@@ -146,7 +157,7 @@ def _resolved_coloring(coloring: str | None, colors: Floats, vertices: int, face
 
 
 def _checked_texture(texture: Numbers) -> Floats:
-    image = np.asarray(texture)
+    image = plain_array("mesh.texture", texture)
     if image.dtype.kind in "iu":
         image = image / np.iinfo(image.dtype).max
     array = float_array("mesh.texture", image, ("height", "width", 3))

@@ -63,6 +63,9 @@ class Scene:
         _check_type("scene.volume", volume, Volume, optional=True)
         _check_type("scene.transfer", transfer, TransferFunction, optional=True)
         _check_type("scene.camera", camera, Camera)
+        if not isinstance(meshes, Sequence):
+            message = f"scene.meshes must be a list of meshes, got {type(meshes).__name__}; give [mesh] or ()"
+            raise SceneError(message)
         for i, mesh in enumerate(meshes):
             _check_type(f"scene.meshes[{i}]", mesh, Mesh)
         if (volume is None) != (transfer is None):

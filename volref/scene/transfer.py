@@ -20,7 +20,18 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from volref.arrays import Booleans, Floats, ShapeRule, float_array, number, one_of, set_fields
+from volref.arrays import (
+    LARGEST_LENGTH,
+    LEAST_LENGTH,
+    Booleans,
+    Floats,
+    ShapeRule,
+    float_array,
+    number,
+    one_of,
+    plain_array,
+    set_fields,
+)
 from volref.errors import SceneError
 
 INTERPOLATIONS = ("extinction", "opacity")
@@ -85,7 +96,7 @@ class TransferFunction:
             if extinction is None
             else _at_least_zero("transfer.extinction", extinction, count),
             opacity=None if opacity is None else _checked_opacity(opacity, count),
-            unit_distance=number("transfer.unit_distance", unit_distance, above=0),
+            unit_distance=_checked_length(unit_distance),
         )
 
     @classmethod
@@ -118,7 +129,7 @@ class TransferFunction:
             message = "transfer.opacity must stay below 1 where extinction is interpolated, got 1 at index "
             message += f"{int(np.argmax(alpha == 1))}; lower it or use interpolation='opacity'"
             raise SceneError(message)
-        length = number("transfer.unit_distance", unit_distance, above=0)
+        length = _checked_length(unit_distance)
         extinction = -np.log1p(-alpha) / length
         return cls(values, colors, extinction, unit_distance=length)
 
@@ -144,7 +155,7 @@ class TransferFunction:
         >>> TransferFunction.from_lut(table, (0, 8)).values.tolist()
         [1.0, 3.0, 5.0, 7.0]
         """
-        table = np.asarray(rgba)
+        table = plain_array("transfer.rgba", rgba)
         if table.dtype.kind in "iu":
             table = table / np.iinfo(table.dtype).max
         table = float_array("transfer.rgba", table, ("n", 4))
@@ -187,7 +198,7 @@ class TransferFunction:
         most = max(np.interp([low, high], self.values, strength).max(), *strength[inside], 0.0)
         if self.extinction is not None:
             return float(most)
-        return math.inf if most == 1 else -math.log1p(-most) / self.unit_distance
+        return math.inf if most >= 1 else -math.log1p(-most) / self.unit_distance
 
     def is_visible(self, low: ArrayLike, high: ArrayLike) -> Booleans:
         """Tell for each range of values from `low` to `high` whether anything in it has an opacity above 0.
@@ -209,6 +220,11 @@ class TransferFunction:
         reaches_above = (last < len(knots)) & ((last == 0) | (high > knots[last - 1]))
         seen_from_above = reaches_above & seen[np.minimum(last, len(knots) - 1)]
         return np.asarray(seen_knot_inside | seen_from_below | seen_from_above)
+
+
+def _checked_length(unit_distance: float) -> float:
+    length = number("transfer.unit_distance", unit_distance, above=0, high=LARGEST_LENGTH)
+    return number("transfer.unit_distance", length, low=LEAST_LENGTH)
 
 
 def _checked_positions(values: ArrayLike) -> Floats:

@@ -15,7 +15,18 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from volref.arrays import Floats, Numbers, Vector, float_array, number, one_of, set_fields
+from volref.arrays import (
+    LARGEST_LENGTH,
+    LEAST_LENGTH,
+    Floats,
+    Numbers,
+    Vector,
+    float_array,
+    number,
+    one_of,
+    plain_array,
+    set_fields,
+)
 from volref.errors import SceneError
 from volref.scene.transform import affine, check_regular, invert_affine
 
@@ -33,7 +44,7 @@ class Volume:
     ----------
     values
         Array (nz, ny, nx) of any integer or real type, in raw units (HU, dBZ, codes).  Kept as it is,
-        without a copy, so a memory-mapped file stays one.
+        without a copy, so a memory-mapped file stays one; do not change the array afterwards.
     spacing
         World distance (sx, sy, sz) between neighbouring samples.
     origin
@@ -79,7 +90,7 @@ class Volume:
             self,
             values=_checked_values(values, centering, nan),
             spacing=_positive_spacing(spacing),
-            origin=tuple(float_array("volume.origin", origin, (3,)).tolist()),
+            origin=tuple(float_array("volume.origin", origin, (3,), limit=LARGEST_LENGTH).tolist()),
             direction=_unit_columns(direction),
             centering=centering,
         )
@@ -121,10 +132,11 @@ class Volume:
 
 
 def _positive_spacing(spacing: ArrayLike) -> Vector:
-    array = float_array("volume.spacing", spacing, (3,))
+    array = float_array("volume.spacing", spacing, (3,), limit=LARGEST_LENGTH)
     if not (array > 0).all():
         message = f"volume.spacing must be positive, got {array.tolist()}; "
         raise SceneError(message + "give the distance between samples and flip an axis by volume.direction")
+    number("volume.spacing", array.min(), low=LEAST_LENGTH)
     return tuple(array.tolist())
 
 
@@ -140,7 +152,7 @@ def _unit_columns(direction: ArrayLike) -> Floats:
 
 
 def _checked_values(values: Numbers, centering: str, nan: str | float) -> Numbers:
-    array = np.asanyarray(values)
+    array = plain_array("volume.values", values)
     least = 2 if centering == "node" else 1
     if array.ndim != 3 or min(array.shape) < least:
         message = f"volume.values must have shape (nz, ny, nx), each at least {least} for {centering!r} "
@@ -170,7 +182,14 @@ def _finite_values(array: Numbers, nan: str | float) -> Numbers:
         message = f"volume.values must be finite, got {array[where]} at (z, y, x) = {where} "
         message += f"and {int((~finite).sum())} such voxels; "
         raise SceneError(message + "pass nan=VALUE to replace them")
-    return np.where(finite, array, array.dtype.type(number("volume.nan", nan)))
+    with np.errstate(over="ignore"):
+        value = array.dtype.type(number("volume.nan", nan))
+    if not np.isfinite(value):
+        message = (
+            f"volume.nan must be a finite {array.dtype}, got {nan:g}; choose a value that the type holds"
+        )
+        raise SceneError(message)
+    return np.where(finite, array, value)
 
 
 def _refuse_large(array: Numbers) -> None:

@@ -101,7 +101,9 @@ def _pieces(values: Floats, channels: Floats) -> tuple[Floats, Floats, Floats, F
 def classify(table: Table, values: Floats, work: Workspace) -> tuple[Floats, Floats]:
     """Return the straight colours (3, n) and the extinction or opacity (n,) of values.
 
-    At a knot they are the knot's own numbers, exactly.  The result lies in `work` until the next call.
+    At a knot they are the knot's own numbers, exactly.  Between knots the strength may be rounded past
+    theirs, so it is held to at least 0, and an opacity to at most 1, beyond which it has no logarithm.  The
+    result lies in `work` until the next call.
     """
     n = len(values)
     entry = _entries(table, values, work)
@@ -115,6 +117,9 @@ def classify(table: Table, values: Floats, work: Workspace) -> tuple[Floats, Flo
         np.multiply(out, offset, out=out)
         np.take(table.base[channel], entry, out=base, mode="wrap")
         np.add(out, base, out=out)
+    np.maximum(result[3], 0.0, out=result[3])
+    if table.interpolation == "opacity":
+        np.minimum(result[3], 1.0, out=result[3])
     return result[:3], result[3]
 
 

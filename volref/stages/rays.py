@@ -16,8 +16,9 @@ def pixel_rays(camera: Camera, width: int, height: int, pixels: Indices) -> Rays
 
     With the projection rows P of `clip_from_view`, a view point (x, y, z) lands at
     x_ndc = (P00 x + P01 y + P02 z + P03) / w, and y_ndc likewise.  A perspective ray leaves the eye along
-    the (x, y) that solves this at z = -1 (w = 1); a parallel ray leaves the near plane along -z from the
-    (x, y) that solves it there.  Directions have length 1 to rounding (2 ulp).
+    the (x, y) that solves this at z = -1 (w = 1).  A parallel ray leaves the near plane from the (x, y) that
+    solves it there, along the direction that leaves it unchanged: -z, or obliquely where P02 or P12 is not
+    0.  Directions have length 1 to rounding (2 ulp).
 
     Examples
     --------
@@ -28,19 +29,25 @@ def pixel_rays(camera: Camera, width: int, height: int, pixels: Indices) -> Rays
     """
     clip = camera.clip_from_view(width, height)
     view_z = -camera.near if camera.is_parallel else -1.0
-    (a, b), (c, d) = clip[:2, :2]
-    x, y = (pixel_ndc(width, height, pixels) - (clip[:2, 2] * view_z + clip[:2, 3])).T
-    determinant = a * d - b * c
-    view_x, view_y = (d * x - b * y) / determinant, (a * y - c * x) / determinant
-    view = np.stack([view_x, view_y, np.full(len(pixels), view_z)], axis=-1)
+    shifted = pixel_ndc(width, height, pixels) - (clip[:2, 2] * view_z + clip[:2, 3])
+    view = np.full((len(pixels), 3), view_z)
+    view[:, :2] = _solve(clip[:2, :2], shifted)
     world_from_view = camera.world_from_view
     if camera.is_parallel:
-        forward = transform_directions(world_from_view, np.array([0.0, 0.0, -1.0]))
+        forward = transform_directions(world_from_view, np.array([*_solve(clip[:2, :2], clip[:2, 2]), -1.0]))
         directions = np.broadcast_to(forward / np.linalg.norm(forward), view.shape)
         return Rays(transform_points(world_from_view, view), directions)
     directions = transform_directions(world_from_view, view)
     directions /= np.sqrt((directions**2).sum(axis=1, keepdims=True))
     return Rays(np.broadcast_to(world_from_view[:3, 3], view.shape), directions)
+
+
+def _solve(matrix: Floats, right: Floats) -> Floats:
+    """Return the solutions (..., 2) of matrix (2, 2) @ x = right (..., 2), each computed by itself."""
+    (a, b), (c, d) = matrix
+    x, y = right[..., 0], right[..., 1]
+    determinant = a * d - b * c
+    return np.stack([(d * x - b * y) / determinant, (a * y - c * x) / determinant], axis=-1)
 
 
 def pixel_ndc(width: int, height: int, pixels: Indices) -> Floats:

@@ -117,7 +117,7 @@ def segments_of(spans: Spans, step: float) -> tuple[Indices, Floats, Floats]:
     """Return for each span how many segments it has, their length, and the length of the last, (R,) each.
 
     A span of 0.4 has 4 segments of 0.1, although rounding may make 0.4 / 0.1 more than 4: a last segment
-    shorter than 1e-12 steps is joined to the one before it.
+    shorter than 1e-12 of the span is joined to the one before it.
 
     Examples
     --------

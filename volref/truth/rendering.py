@@ -10,6 +10,7 @@ import numpy as np
 
 from volref import planning
 from volref.arrays import Floats, Indices, whole_number
+from volref.errors import SceneError
 from volref.planning import HALF_LEVEL, RAYS_PER_CHUNK, Plan
 from volref.records import Surface
 from volref.scene.scene import Scene
@@ -54,13 +55,13 @@ def render(
     Raises
     ------
     SceneError
-        If an argument breaks a rule of `volref.plan`.
+        If an argument breaks a rule of `volref.plan`, or the plan is another scene's.
     """
     started = time.perf_counter()
-    decided = plan or planning.plan(scene, method=method, step=step, tolerance=tolerance)
+    decided = decide(scene, plan, method, step, tolerance)
     workers = available_cores() if threads is None else whole_number("threads", threads, low=1, high=1024)
     surface = visible_surface(scene) if decided.includes("meshes") else None
-    field = field_of(scene) if decided.includes("volume") and scene.volume is not None else None
+    field = field_of(scene) if decided.includes("volume") else None
     pixels = scene.width * scene.height
     rgba, bound = np.empty((pixels, 4)), np.empty(pixels)
     distance = np.full(pixels, np.inf) if surface is None else surface.distance.reshape(-1)
@@ -70,10 +71,12 @@ def render(
 
     def march(first: int) -> int:
         part = np.arange(first, min(first + RAYS_PER_CHUNK, pixels))
-        work = spare.get()
         behind = light_behind(scene, surface, part)
-        chunk = march_chunk(scene, decided, field, part, distance[part], behind, work)
-        spare.put(work)
+        work = spare.get()
+        try:
+            chunk = march_chunk(scene, decided, field, part, distance[part], behind, work)
+        finally:
+            spare.put(work)  # a thread that waited for it would wait for ever
         rgba[part], bound[part] = chunk.rgba, chunk.bound
         return chunk.samples
 
@@ -89,6 +92,34 @@ def render(
         workers,
         decided,
     )
+
+
+def decide(
+    scene: Scene,
+    plan: Plan | None,
+    method: str = "march",
+    step: float | None = None,
+    tolerance: float = HALF_LEVEL,
+) -> Plan:
+    """Return the plan to follow: the given one, checked, or one made from the other arguments.
+
+    Raises
+    ------
+    SceneError
+        If both are given, or the plan is another scene's.
+    """
+    if plan is None:
+        return planning.plan(scene, method=method, step=step, tolerance=tolerance)
+    if not isinstance(plan, Plan):
+        message = f"plan must be a volref.Plan, got {type(plan).__name__}; make one with volref.plan(scene)"
+        raise SceneError(message)
+    if method != plan.method or step is not None or tolerance not in (HALF_LEVEL, plan.tolerance):
+        message = (
+            f"plan must stand alone, got method {method!r}, step {step} and tolerance {tolerance:g} too; "
+        )
+        raise SceneError(message + "state them to volref.plan, or dataclasses.replace them in the plan")
+    plan.check(scene)
+    return plan
 
 
 def light_behind(scene: Scene, surface: Surface | None, pixels: Indices) -> Floats:

@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 
-from volref import planning
 from volref.arrays import Floats, Numbers, whole_number
 from volref.errors import SceneError
 from volref.planning import Plan
@@ -23,7 +22,7 @@ from volref.stages.rays import pixel_rays
 from volref.stages.sampling import PAD, trilinear
 from volref.stages.spans import box_spans, cut_at_surface
 from volref.truth.march import Field, field_of, segments_of
-from volref.truth.rendering import light_behind
+from volref.truth.rendering import decide, light_behind
 from volref.truth.surfaces import visible_surface
 from volref.workspace import Workspace
 
@@ -89,8 +88,8 @@ def trace(
     SceneError
         If the pixel lies outside the image, or an argument breaks a rule of `volref.plan`.
     """
+    decided = decide(scene, plan, step=step)
     x, y = _checked_pixel(scene, pixel)
-    decided = plan or planning.plan(scene, step=step)
     flat = np.array([y * scene.width + x])
     rays = pixel_rays(scene.camera, scene.width, scene.height, flat)
     surface = visible_surface(scene) if scene.meshes else None
@@ -142,12 +141,18 @@ def _trace_volume(scene: Scene, plan: Plan, rays: Rays, distance: float, head: d
     transmittance = table["transmittance"][-1] - table["weight"][-1]
     rgba = table["accumulated"][-1] + transmittance * np.array(head["behind"])
     met = "meets an opaque surface" if t_far == distance else "leaves the volume"
-    head = {**head, "span": [t_near, t_far], "ended": f"the ray {met}", "rgba": rgba.tolist()}
+    head = {
+        **head,
+        "step": float(steps[0]),
+        "span": [t_near, t_far],
+        "ended": f"the ray {met}",
+        "rgba": rgba.tolist(),
+    }
     return Trace(head, {name: table[name] for name in COLUMNS})
 
 
 def _checked_pixel(scene: Scene, pixel: Sequence[int]) -> tuple[int, int]:
-    if len(pixel) != 2:
+    if not isinstance(pixel, Sequence) or len(pixel) != 2:
         message = f"pixel must be two numbers x, y, got {pixel!r}; count from the top left, from 0"
         raise SceneError(message)
     x = whole_number("pixel x", pixel[0], low=0, high=scene.width - 1)
