@@ -106,18 +106,40 @@ def npz_of(**members):
     return file_of("a.npz", stream.getvalue())
 
 
+def obj_of(material):
+    """Return a builder of a triangle with the lines `material` in its .mtl file."""
+    text = b"mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl m\nf 1 2 3\n"
+
+    def build(folder):
+        (folder / "a.mtl").write_text(f"newmtl m\n{material}\n")
+        return file_of("a.obj", text)(folder)
+
+    return build
+
+
+def scene_with_transfer(**keys):
+    """Return a builder of a scene whose transfer function is a JSON file, with `keys` beside its path."""
+
+    def build(folder):
+        transfer_of()(folder)
+        file_of("v.npy", npy_bytes(np.zeros((2, 3, 4), np.uint8)))(folder)
+        return scene_of(volume={"path": "v.npy"}, transfer={"path": "tf.json"} | keys)(folder)
+
+    return build
+
+
 def nrrd_bytes(sizes=(4, 3, 2), *, kind="uint8", encoding="raw", data=b"", more=()):
     fields = [f"type: {kind}", f"dimension: {len(sizes)}", f"sizes: {' '.join(map(str, sizes))}"]
     lines = ["NRRD0005", *fields, "endian: little", f"encoding: {encoding}", *more, "", ""]
     return "\n".join(lines).encode() + data
 
 
-def nifti_bytes(shape=(4, 3, 2), *, dtype=np.uint8, dims=None, intent=None, data=None):
-    """Return a NIfTI-1 file; `dims` overwrites what its header says of the shape."""
-    header = nibabel.Nifti1Header()
+def nifti_bytes(shape=(4, 3, 2), *, dtype=np.uint8, dims=None, intent=None, data=None, offset=352, version=1):
+    """Return a NIfTI file; `dims` overwrites what its header says of the shape."""
+    header = nibabel.Nifti1Header() if version == 1 else nibabel.Nifti2Header()
     header.set_data_dtype(dtype)
     header.set_data_shape(shape)
-    header["vox_offset"] = 352
+    header["vox_offset"] = offset
     if intent is not None:
         header.set_intent(intent)
     if dims is not None:
@@ -323,6 +345,79 @@ VOLUMES = [
     BadFile(
         "NRRD text", file_of("a.nrrd", nrrd_bytes(encoding="ascii", data=b"1 2")), "volume", ("'ascii'",)
     ),
+    BadFile(
+        "NRRD negative skip",
+        file_of("a.nrrd", nrrd_bytes(data=b"x" * 24, more=["byte skip: -3"])),
+        "volume",
+        ("byte skip of at least -1", "got -3", "resave"),
+    ),
+    BadFile(
+        "truncated NRRD at the end of its file",
+        file_of("a.nrrd", nrrd_bytes(data=b"x" * 20, more=["byte skip: -1"])),
+        "volume",
+        ("24 bytes", "got 20", "cut short"),
+    ),
+    BadFile(
+        "NRRD of two spacings",
+        file_of(
+            "a.nrrd",
+            nrrd_bytes(data=b"x" * 24, more=["spacings: 1 1 1", "axis mins: 0 0 0", "axis maxs: 4 3 9"]),
+        ),
+        "volume",
+        ("axis maxs that agree", "[4.0, 3.0, 9.0]", "remove axis maxs"),
+    ),
+    BadFile(
+        "NRRD of axis maxs alone",
+        file_of("a.nrrd", nrrd_bytes(data=b"x" * 24, more=["axis maxs: 4 3 2"])),
+        "volume",
+        ("axis maxs that agree", "remove axis maxs"),
+    ),
+    BadFile(
+        "NIfTI voxels in the header",
+        file_of("a.nii", nifti_bytes(offset=0)),
+        "volume",
+        ("byte 352 or later", "vox_offset", "got 0"),
+    ),
+    BadFile(
+        "NIfTI voxels in the header of .nii.gz",
+        file_of("a.nii.gz", gzip.compress(nifti_bytes(offset=0))),
+        "volume",
+        ("byte 352 or later", "got 0"),
+    ),
+    BadFile(
+        "NIfTI-2 voxels in the header",
+        file_of("a.nii", nifti_bytes(offset=0, version=2)),
+        "volume",
+        ("byte 544 or later", "got 0"),
+    ),
+    BadFile(
+        ".npz of two spacings",
+        npz_of(
+            volume=npy_bytes(BOX),
+            spacing=npy_bytes(np.ones(3)),
+            affine_ijk_to_ras_mm=npy_bytes(np.eye(4) * 2),
+        ),
+        "volume",
+        ("spacing once", "[1.0, 1.0, 1.0]", "affine_ijk_to_ras_mm", "[2.0, 2.0, 2.0]", "remove"),
+    ),
+    BadFile(
+        ".npz of two origins",
+        npz_of(
+            volume=npy_bytes(BOX), origin=npy_bytes(np.ones(3)), affine_ijk_to_lps_mm=npy_bytes(np.eye(4))
+        ),
+        "volume",
+        ("origin once", "affine_ijk_to_lps_mm", "[0.0, 0.0, 0.0]", "remove"),
+    ),
+    BadFile(
+        ".npz of two orders",
+        npz_of(
+            volume=npy_bytes(BOX),
+            spacing=npy_bytes(np.arange(3) + 1),
+            spacing_zyx=npy_bytes(np.arange(3) + 1),
+        ),
+        "volume",
+        ("spacing once", "[1, 2, 3]", "spacing_zyx", "[3, 2, 1]"),
+    ),
     BadFile("not a NIfTI", file_of("a.nii", b"x" * 400), "volume", ("a.nii", "NIfTI header")),
     BadFile("truncated NIfTI", file_of("a.nii", nifti_bytes()[:-1]), "volume", ("376 bytes", "got 375")),
     BadFile("truncated NIfTI header", file_of("a.nii", nifti_bytes()[:100]), "volume", ("NIfTI header",)),
@@ -394,6 +489,18 @@ MESHES = [
         "mesh",
         ("mesh.vertices", "nan"),
     ),
+    BadFile(
+        "transparent by d", obj_of("Kd 1 0 0\nd 0.5"), "mesh", ("a.obj", "opaque", "d 0.5", "set it to 1")
+    ),
+    BadFile("transparent by Tr", obj_of("Kd 1 0 0\nTr 0.5"), "mesh", ("opaque", "Tr 0.5", "set it to 0")),
+    BadFile("transparent by a halo", obj_of("d -halo 0.5"), "mesh", ("opaque", "d -halo 0.5")),
+    BadFile("transparent by a map", obj_of("Kd 1 0 0\nmap_d b.png"), "mesh", ("map_d b.png", "remove map_d")),
+    BadFile("Kd above 1", obj_of("Kd 255 0 0"), "mesh", ("a.obj", "Kd of 3 numbers in 0..1", "255.0")),
+    BadFile("Kd of one number", obj_of("Kd 0.5"), "mesh", ("a.mtl", "3 numbers for Kd", "'Kd 0.5'")),
+    BadFile("Kd of a spectrum", obj_of("Kd spectral a.rfl"), "mesh", ("3 numbers for Kd", "a.rfl")),
+    BadFile("Ka of two numbers", obj_of("Kd 1 0 0\nKa 1 0\nd 0.5"), "mesh", ("3 numbers for Ka", "mend it")),
+    BadFile("Ns of two numbers", obj_of("Kd 1 0 0\nNs 1 0\nd 0.5"), "mesh", ("1 numbers for Ns", "mend it")),
+    BadFile("Kd of NaN", obj_of("Kd nan 0 0"), "mesh", ("Kd of 3 numbers in 0..1", "nan")),
     BadFile("damaged GLB", file_of("a.glb", b"glTF" + b"\2\0\0\0" * 8), "mesh", ("readable mesh",)),
     BadFile("damaged STL", file_of("a.stl", b"solid" + b"\xff" * 100), "mesh", ("a.stl",)),
     BadFile(
@@ -440,6 +547,13 @@ TRANSFERS = [
         ("transfer.rgba", "(9, 3)"),
         {"domain": (0, 1)},
     ),
+    *(
+        BadFile(f"JSON with {name}", transfer_of(), "transfer", ("tf.json", f"without {name}"), {name: value})
+        for name, value in (
+            *(("domain", (0, 1)), ("unit_distance", 1.0)),
+            *(("texel_centers", False), ("interpolation", "extinction")),
+        )
+    ),
     BadFile("transfer suffix", file_of("t.xml", b"x"), "transfer", ("t.xml", ".json", "convert")),
 ]
 
@@ -468,6 +582,17 @@ IMAGES = [
 
 SCENES = [
     BadFile("corrupt JSON", file_of("s.json", b'{"format": '), "scene", ("s.json", "readable JSON", "mend")),
+    BadFile("400 digits", camera_of(near=10**400), "scene", ("scene.json", "401 digits", "mend")),
+    BadFile("-400 digits", camera_of(near=-(10**400)), "scene", ("scene.json", "401 digits", "mend")),
+    BadFile("400 pixels' digits", scene_of(width=10**400), "scene", ("401 digits", "mend")),
+    BadFile("width of 300 digits", scene_of(width=10**300), "scene", ("scene.width", "1e+300")),
+    BadFile("width of 20 digits", scene_of(width=10**19), "scene", ("scene.width", "65536")),
+    BadFile(
+        "format version of 300 digits",
+        scene_of(format_version=10**300),
+        "scene",
+        ("format_version", "1e+300"),
+    ),
     BadFile("not UTF-8", file_of("s.json", b"\xff\xfe{"), "scene", ("s.json", "readable JSON")),
     BadFile("deep JSON", file_of("s.json", b"[" * 10**5), "scene", ("s.json", "readable JSON")),
     BadFile("NaN in JSON", file_of("s.json", b'{"width": NaN}'), "scene", ("NaN", "JSON does not have")),
@@ -515,6 +640,15 @@ SCENES = [
         scene_of(background=[1, 1, 1, 0]),
         "scene",
         ("premultiplied", "alpha 0"),
+    ),
+    *(
+        BadFile(
+            f"JSON transfer with {name}",
+            scene_with_transfer(**{name: value}),
+            "scene",
+            ("tf.json", f"without {name}", "change the file"),
+        )
+        for name, value in (("texel_centers", False), ("interpolation", "extinction"), ("domain", [0, 1]))
     ),
     BadFile(
         "path above",

@@ -1,5 +1,7 @@
 """Every record and every reader refuses what breaks its rules, with one sentence: name, value, rule, cure."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -121,6 +123,7 @@ def assert_one_sentence(error, fragments):
     assert "\n" not in message
     assert message.count("; ") == 1, message
     assert not message.endswith((".", "; "))
+    assert re.search(r"\d{40}", message) is None  # nobody reads more digits than a float64 has
     missing = [fragment for fragment in fragments if fragment not in message]
     assert not missing, f"{missing} not in: {message}"
 

@@ -88,3 +88,15 @@ def test_a_sidecar_that_exists_stops_the_conversion(tmp_path):
     with pytest.raises(FormatError, match=r"v\.npy\.json must not exist yet"):
         save_volume(VOLUME, tmp_path / "v.npy")
     assert not (tmp_path / "v.npy").exists()
+
+
+@pytest.mark.parametrize("suffix", [".npz", ".nrrd", ".nii"])
+def test_an_old_sidecar_of_a_format_that_needs_none_is_refused_or_removed(tmp_path, suffix):
+    path, beside = tmp_path / f"v{suffix}", tmp_path / f"v{suffix}.json"
+    beside.write_text('{"spacing": [9, 9, 9]}')
+    with pytest.raises(FormatError, match=r"\.json must not exist yet"):
+        save_volume(VOLUME, path)
+    assert not path.exists()
+    save_volume(VOLUME, path, overwrite=True)
+    assert_same(VOLUME, load_volume(path), FLOAT32)
+    assert not beside.exists()

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from tests.bad_files import CAMERA, SCENES, TRANSFER, TRIANGLE, scene_document
 from volref.errors import FormatError
 from volref.io import scene_schema
-from volref.io.documents import KEYWORDS, TYPES, check_document, find_problem
+from volref.io.documents import KEYWORDS, TYPES, check_document, find_problem, whole_numbers
 from volref.io.guard import read_json
 from volref.io.raw import RAW_TYPES
 from volref.io.volumes import READERS
@@ -163,3 +163,55 @@ def test_an_unknown_key_is_named_with_the_nearest_known_one(tmp_path):
     document = scene_document(camera={**CAMERA, "fovy": 3})
     with pytest.raises(FormatError, match=r"scene\.json: camera\.fovy must be .* use 'fov_y'$"):
         check_document(tmp_path / "scene.json", document)
+
+
+def with_points(value):
+    """Return a document with every int as a float."""
+    if isinstance(value, dict):
+        return {key: with_points(item) for key, item in value.items()}
+    if isinstance(value, list):
+        return [with_points(item) for item in value]
+    return float(value) if type(value) is int else value
+
+
+def types(value):
+    """Return a document with the type of every value in its place."""
+    if isinstance(value, dict):
+        return {key: types(item) for key, item in value.items()}
+    return [types(item) for item in value] if isinstance(value, list) else type(value)
+
+
+INTEGERS = ("width", "height", "size", "skip", "tiles_across", "tiles_down", "slices", "padding", "faces")
+
+
+def integers(document):
+    """Return the values of the keys that hold whole numbers."""
+    parts = [document, document.get("volume", {}), *document.get("meshes", [])]
+    return [part[key] for part in parts for key in INTEGERS if key in part]
+
+
+@pytest.mark.parametrize("document", VALID)
+def test_a_whole_number_may_be_written_with_a_point(document):
+    """JSON Schema takes 4.0 for an integer; the records do not, so the reader hands them 4."""
+    document = as_json(document)
+    pointed = with_points(document)
+    assert JUDGE.is_valid(pointed)
+    assert our_verdict(pointed)
+    whole = whole_numbers(pointed)
+    assert whole == document
+    assert types(integers(whole)) == types(integers(document))
+    assert types(whole["camera"]) == types(pointed["camera"])  # no number but the integers is touched
+
+
+def test_what_no_integer_is_stays_as_it_is():
+    document = {
+        "width": 1.5,
+        "height": True,
+        "nonsense": 2.0,
+        "meshes": [{"faces": 3.0}],
+        "background": [1.0],
+    }
+    assert whole_numbers(document) == document
+    assert types(whole_numbers(document)) == types(document)
+    assert whole_numbers({"width": 1e300}) == {"width": 1e300}
+    assert isinstance(whole_numbers({"width": 1e300})["width"], float)

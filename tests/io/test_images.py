@@ -95,3 +95,18 @@ def test_a_header_that_promises_more_than_the_file_can_hold_is_refused_at_once(t
     (tmp_path / "a.png").write_bytes(b"\x89PNG\r\n\x1a\n" + chunk)
     with pytest.raises(FormatError, match="compressed bytes, which cannot"):
         read_image(tmp_path / "a.png")
+
+
+@pytest.mark.parametrize(
+    ("color_type", "depth", "side"), [(0, 16, 300), (2, 8, 220), (4, 8, 300), (6, 8, 200)]
+)
+def test_the_promise_of_a_header_counts_every_sample_of_a_pixel(tmp_path, color_type, depth, side):
+    """One byte a pixel would fit in what so short a stream can hold at best; all its samples do not."""
+    data = png_bytes(side, side, depth, color_type, rows=b"\0")
+    samples = {0: 1, 2: 3, 4: 2, 6: 4}[color_type] * depth // 8
+    assert side**2 < 1032 * len(data) + 2**16 < samples * side**2
+    (tmp_path / "a.png").write_bytes(data)
+    with pytest.raises(
+        FormatError, match=f"must hold {samples * side**2} bytes .* compressed bytes, which cannot"
+    ):
+        read_image(tmp_path / "a.png")

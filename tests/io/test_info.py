@@ -86,3 +86,10 @@ def test_an_unknown_file_is_refused(tmp_path):
     (tmp_path / "a.xyz").write_text("x")
     with pytest.raises(FormatError, match="must be a volume, mesh, scene"):
         describe_file(tmp_path / "a.xyz")
+
+
+def test_an_npy_volume_4_across_with_its_sidecar_is_a_volume(tmp_path):
+    save_volume(Volume(np.zeros((2, 3, 4), np.uint8)), tmp_path / "v.npy")
+    assert describe(tmp_path / "v.npy")["size"] == [4, 3, 2]
+    (tmp_path / "v.npy.json").unlink()
+    assert describe(tmp_path / "v.npy")["kind"] == "image"

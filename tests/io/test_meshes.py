@@ -9,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from PIL import Image
 
+from tests.bad_files import obj_of
 from volref.errors import FormatError, SceneError
 from volref.io import load_mesh, load_meshes, save_mesh
 from volref.scene import Mesh
@@ -203,3 +204,41 @@ def test_a_broken_npz_mesh_breaks_the_rules_of_mesh(tmp_path):
     np.savez(tmp_path / "a.npz", vertices=CORNERS, faces=FACES + 1)
     with pytest.raises(SceneError, match="indices that start at 1"):
         load_mesh(tmp_path / "a.npz")
+
+
+def material_mesh(folder, material):
+    return load_mesh(obj_of(material)(folder))
+
+
+@pytest.mark.parametrize(
+    ("material", "color"),
+    [
+        ("Kd 0.4 0.4 0.4", (0.4, 0.4, 0.4)),  # the grey that trimesh fills in where there is no Kd
+        ("Kd 0.1 0.25 0.999", (0.1, 0.25, 0.999)),
+        ("Ka 1 0 0", (0.8, 0.8, 0.8)),
+    ],
+)
+def test_a_colour_in_an_mtl_file_is_taken_as_written(tmp_path, material, color):
+    assert material_mesh(tmp_path, material).colors.tolist() == list(color)
+
+
+def test_a_factor_of_102_in_a_glb_is_that_grey_and_not_the_default(tmp_path):
+    material = trimesh.visual.material.PBRMaterial(baseColorFactor=(102, 102, 102, 255))
+    tetrahedron(visual=trimesh.visual.TextureVisuals(CORNERS[:, :2], material)).export(tmp_path / "a.glb")
+    assert load_mesh(tmp_path / "a.glb").colors.tolist() == [0.4, 0.4, 0.4]
+
+
+@pytest.mark.parametrize("opaque", ["d 1", "d 1.0000", "Tr 0", "d -halo 1", "Tf 1 1 1\nNi 1.5\nillum 2"])
+def test_an_opaque_material_is_read(tmp_path, opaque):
+    assert material_mesh(tmp_path, f"Kd 1 0 0\n{opaque}").colors.tolist() == [1, 0, 0]
+
+
+def test_a_texture_with_the_default_grey_for_a_stated_tint_is_refused(tmp_path):
+    Image.new("RGB", (2, 3)).save(tmp_path / "b.png")
+    (tmp_path / "a.mtl").write_text("newmtl m\nmap_Kd b.png\nKd 0.4 0.4 0.4\n")
+    text = "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nusemtl m\nf 1/1 2/1 3/1\n"
+    (tmp_path / "a.obj").write_text(text)
+    with pytest.raises(FormatError, match=r"must not tint its texture, got the factor \[0\.4, 0\.4, 0\.4\]"):
+        load_mesh(tmp_path / "a.obj")
+    (tmp_path / "a.mtl").write_text("newmtl m\nmap_Kd b.png\n")
+    assert load_mesh(tmp_path / "a.obj").coloring == "texture"

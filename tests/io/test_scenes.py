@@ -209,3 +209,19 @@ def test_one_mesh_file_with_several_meshes_gives_them_all(tmp_path):
     (tmp_path / "a.obj").write_text(text)
     scene = load_scene(write(tmp_path, meshes=[{"path": "a.obj"}, TRIANGLE | {"colors": [1, 0, 0]}]))
     assert [mesh.colors.tolist() for mesh in scene.meshes] == [[0.8, 0.8, 0.8], [1, 0, 0]]
+
+
+def test_the_pixels_and_faces_of_a_scene_may_be_written_with_a_point(tmp_path):
+    faces = {"faces": [[0.0, 1, 2.0]]}
+    document = scene_document(width=4.0, height=3.0, meshes=[TRIANGLE | faces])
+    (tmp_path / "scene.json").write_text(json.dumps(document))
+    scene = load_scene(tmp_path / "scene.json")
+    assert (scene.width, scene.height) == (4, 3)
+    assert (type(scene.width), type(scene.height)) == (int, int)
+    assert scene.meshes[0].faces.tolist() == [[0, 1, 2]]
+
+
+def test_whole_numbers_of_20_digits_are_the_nearest_floats(tmp_path):
+    text = json.dumps(scene_document()).replace('"far": 100', '"far": 100000000000000000000000')
+    (tmp_path / "scene.json").write_text(text)
+    assert load_scene(tmp_path / "scene.json").camera.far == 1e23

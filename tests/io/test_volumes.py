@@ -9,6 +9,7 @@ import nrrd
 import numpy as np
 import pytest
 
+from tests.bad_files import nrrd_bytes
 from volref.errors import FormatError
 from volref.io import load_raw, load_volume
 from volref.scene.transform import transform_points
@@ -234,3 +235,53 @@ def test_a_missing_reader_is_one_sentence_with_the_command(tmp_path, monkeypatch
     (tmp_path / f"f{suffix}").write_bytes(b"NRRD0004\n")
     with pytest.raises(FormatError, match=r"pip install 'volref\[(nrrd|nifti)\]'$"):
         load_volume(tmp_path / f"f{suffix}")
+
+
+@pytest.mark.parametrize(
+    "spelling", ["axis mins: 10 20 30\naxis maxs: 20 26 38", "axismins: 10 20 30\naxismaxs: 20 26 38"]
+)
+@pytest.mark.parametrize(
+    ("centering", "spacing", "origin"),
+    [("cell", (2.5, 2, 4), (11.25, 21, 32)), ("node", (10 / 3, 3, 8), (10, 20, 30))],
+)
+def test_nrrd_axis_mins_and_maxs_state_the_spacing(tmp_path, spelling, centering, spacing, origin):
+    """Worked by hand for 4 x 3 x 2 samples: 10 is 4 cells of 2.5 or 3 steps of 10 / 3."""
+    more = [spelling, f"centers: {centering} {centering} {centering}"]
+    (tmp_path / "a.nrrd").write_bytes(nrrd_bytes(data=b"x" * 24, more=more))
+    volume = load_volume(tmp_path / "a.nrrd")
+    assert (volume.spacing, volume.origin, volume.centering) == (spacing, origin, centering)
+
+
+def test_nrrd_axis_maxs_may_stand_beside_the_spacings_they_agree_with(tmp_path):
+    more = ["spacings: 0.333333 1 1", "axis mins: 0 0 0", "axis maxs: 1.33333 3 2"]
+    (tmp_path / "a.nrrd").write_bytes(nrrd_bytes(data=b"x" * 24, more=more))
+    assert load_volume(tmp_path / "a.nrrd").spacing == (0.333333, 1, 1)
+
+
+@pytest.mark.parametrize("skip", [-1, 3])
+def test_nrrd_samples_begin_after_the_skip_or_end_the_file(tmp_path, skip):
+    data = bytes(range(24))
+    (tmp_path / "a.nrrd").write_bytes(nrrd_bytes(data=b"abc" + data, more=[f"byte skip: {skip}"]))
+    assert load_volume(tmp_path / "a.nrrd").values.tobytes() == data
+
+
+def test_npz_may_state_its_place_twice_if_both_agree(tmp_path):
+    """A spacing rounded to 5 digits beside the matrix, which is taken."""
+    affine = np.diag([1.140625, 1.140625, 5, 1])
+    np.savez(
+        tmp_path / "f.npz", volume=letter_f(), spacing_zyx=(5, 1.1406, 1.1406), affine_ijk_to_ras_mm=affine
+    )
+    assert load_volume(tmp_path / "f.npz").spacing == (1.140625, 1.140625, 5)
+
+
+def test_a_sidecar_may_write_4_as_4_point_0(tmp_path):
+    (tmp_path / "f.raw").write_bytes(letter_f().astype("<i2").tobytes())
+    stated = {
+        "size": [5.0, 6, 4.0],
+        "dtype": "int16",
+        "byte_order": "little",
+        "skip": 0.0,
+        "spacing": [1, 1, 1],
+    }
+    (tmp_path / "f.raw.json").write_text(json.dumps(stated))
+    assert np.array_equal(load_volume(tmp_path / "f.raw").values, letter_f())

@@ -49,8 +49,9 @@ def save_volume(
     """Write a volume as .npy, .npz, .nrrd, .nii, .nii.gz, .raw or a .png atlas.
 
     Values are never changed.  Where the format has no place for the geometry (.npy, .raw, .png) it stands in
-    a JSON file beside the data, `<name>.json`, which `load_volume` reads.  Geometry comes back bit for bit
-    from .npy, .npz, .raw and .png, to rounding from .nrrd, and to float32 from NIfTI.
+    a JSON file beside the data, `<name>.json`, which `load_volume` reads; the other formats leave none, and
+    with `overwrite` an old one is removed.  Geometry comes back bit for bit from .npy, .npz, .raw and .png,
+    to rounding from .nrrd, and to float32 from NIfTI.
 
     Parameters
     ----------
@@ -60,7 +61,7 @@ def save_volume(
     Raises
     ------
     FormatError
-        If the format cannot hold the volume, or the file exists and `overwrite` is False.
+        If the format cannot hold the volume, or the file or `<name>.json` exists and `overwrite` is False.
     """
     file = Path(path)
     suffix = ".nii.gz" if file.name.lower().endswith(".nii.gz") else file.suffix.lower()
@@ -69,12 +70,14 @@ def save_volume(
         message = f"{one_line(file.name)} must end in {', '.join(_WRITERS)}, got {file.suffix!r}; "
         raise FormatError(message + nearest(file.suffix, _WRITERS))
     beside = file.with_name(file.name + ".json")
-    if writer in (_write_npy, _write_raw, _write_atlas):
-        check_free(beside, overwrite=overwrite)
+    # In every format: `load_volume` would read an old one in place of what the file says.
+    check_free(beside, overwrite=overwrite)
     statement = writer(file, volume, _Options(overwrite, layout))
     if statement is not None:
         text = json.dumps({**statement, **document_of_placement(volume)}, indent=1, allow_nan=False)
         write_text(beside, text + "\n", overwrite=overwrite)
+    elif beside.is_file():
+        beside.unlink()
 
 
 _Statement: TypeAlias = dict[str, Any] | None

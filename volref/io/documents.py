@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from volref.errors import FormatError
-from volref.io.guard import nearest, one_line
+from volref.io.guard import Foreign, nearest, one_line
 
 FORMAT_VERSION = 1
 
@@ -69,6 +69,21 @@ def check_document(file: Path, document: object, definition: str | None = None) 
         raise FormatError(f"{file.name}: {problem}")
 
 
+def whole_numbers(document: Foreign, definition: str | None = None) -> Foreign:
+    """Return a document with an int wherever the schema asks for an integer: JSON may write 4 as 4.0.
+
+    Floats from 2**53 on stay, so no message has to show 300 digits.  What breaks the schema stays as it is.
+
+    Examples
+    --------
+    >>> whole_numbers({"width": 4.0, "background": [0.0, 0.0, 0.0, 1.0]})
+    {'width': 4, 'background': [0.0, 0.0, 0.0, 1.0]}
+    """
+    schema = _schema()
+    rule = schema if definition is None else schema["$defs"][definition]
+    return _whole(document, rule, schema["$defs"])
+
+
 def find_problem(
     value: object, rule: Mapping[str, Any], definitions: Mapping[str, Any], name: str
 ) -> str | None:
@@ -98,6 +113,21 @@ def find_problem(
     if isinstance(value, str) and len(value) < rule.get("minLength", 0):
         return f"{where} must not be empty, got ''; write it out or leave the key away"
     return None
+
+
+def _whole(value: Foreign, rule: Mapping[str, Any], definitions: Mapping[str, Any]) -> Foreign:
+    if "$ref" in rule:
+        return _whole(value, definitions[rule["$ref"].removeprefix("#/$defs/")], definitions)
+    if "anyOf" in rule:
+        fitting = (branch for branch in rule["anyOf"] if find_problem(value, branch, definitions, "") is None)
+        return _whole(value, next(fitting, {}), definitions)
+    if isinstance(value, dict):
+        known = rule.get("properties", {})
+        return {key: _whole(item, known.get(key, {}), definitions) for key, item in value.items()}
+    if isinstance(value, list) and "items" in rule:
+        return [_whole(item, rule["items"], definitions) for item in value]
+    whole = rule.get("type") == "integer" and isinstance(value, float) and value.is_integer()
+    return int(value) if whole and abs(value) < 2**53 else value
 
 
 def _problem_of_object(

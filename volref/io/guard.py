@@ -169,6 +169,8 @@ def extra(module: str, name: str, package: str) -> ModuleType:
 def read_json(path: Path) -> object:
     """Return the document in a JSON file; numbers must be finite and keys may stand only once.
 
+    Whole numbers of 20 digits and more are returned as floats, which is what every rule allows them to be.
+
     Raises
     ------
     FormatError
@@ -179,7 +181,11 @@ def read_json(path: Path) -> object:
     with wrapped(file, "JSON document", "mend it at that place"):
         text = file.read_text(encoding="utf-8")
         return json.loads(
-            text, parse_constant=_refuse_constant, parse_float=_finite_float, object_pairs_hook=_once
+            text,
+            parse_constant=_refuse_constant,
+            parse_float=_finite_float,
+            parse_int=_bounded_int,
+            object_pairs_hook=_once,
         )
 
 
@@ -236,6 +242,17 @@ def _refuse_constant(text: str) -> float:
 def _finite_float(text: str) -> float:
     value = float(text)
     return value if math.isfinite(value) else _refuse_constant(text)
+
+
+def _bounded_int(text: str) -> int | float:
+    if len(text) < 20:
+        return int(text)
+    # Not int(text): Python is slow with thousands of digits, and a message would show them all.
+    value = float(text)
+    if math.isfinite(value):
+        return value
+    message = f"a whole number of {len(text.removeprefix('-'))} digits, beyond the largest float64"
+    raise ValueError(message)
 
 
 def _once(pairs: list[tuple[str, object]]) -> dict[str, object]:

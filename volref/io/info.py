@@ -29,7 +29,8 @@ def describe_file(
     """Return what a file holds.
 
     Its "kind" is "volume", "mesh", "scene", "transfer", "image" or "table" (a lookup table).  `statement` is
-    what `load_volume` needs to be told of the file.  Everything in the result is JSON.
+    what `load_volume` needs to be told of the file.  A .npy or .png with such a statement, in the call or in
+    `<name>.json`, is a volume; a .npy (a, b, 4) without is an image.  Everything in the result is JSON.
 
     Raises
     ------
@@ -123,6 +124,8 @@ def describe_scene(scene: Scene) -> dict[str, Any]:
 
 def _kind_of(file: Path, max_bytes: int) -> str:
     suffix = file.suffix.lower()
+    if suffix in (".npy", ".png") and file.with_name(file.name + ".json").is_file():
+        return "volume"
     if suffix == ".json":
         return _kind_of_json(file)
     if suffix in SUFFIXES:
@@ -133,7 +136,7 @@ def _kind_of(file: Path, max_bytes: int) -> str:
         names = npz_headers(file)
         return "mesh" if {"vertices", "faces"} <= set(names) else "image" if "rgba" in names else "volume"
     if suffix == ".png":
-        return "volume" if file.with_name(file.name + ".json").is_file() else "image"
+        return "image"
     if is_volume_path(file):
         return "volume"
     message = (

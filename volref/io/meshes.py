@@ -3,6 +3,7 @@
 8-bit colours are divided by 255 and not decoded.  volref's own .npz holds the fields of `Mesh` exactly.
 """
 
+import math
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
@@ -27,6 +28,8 @@ from volref.scene.transform import transform_points
 # The formats that trimesh reads without a further package.
 SUFFIXES = (".obj", ".ply", ".stl", ".off", ".glb", ".gltf")
 ARRAYS = ("vertices", "faces", "colors", "uv", "texture")
+# How many numbers a line of an MTL file has (Wavefront; "Kd r" for r, r, r is not read by trimesh).
+MTL_COUNTS = {"kd": 3, "ka": 3, "ks": 3, "ns": 1}
 WORDS = ("wrap", "coloring")
 
 
@@ -34,8 +37,9 @@ def load_mesh(path: str | Path, *, process: bool = False, max_bytes: int = DEFAU
     """Return the one mesh in a file (.obj .ply .stl .off .glb .gltf, or volref's .npz), in world coordinates.
 
     Vertex colours, face colours, a texture with its coordinates, or the colour of a material are carried
-    over; a file without colours gives the grey of `Mesh`.  The scene graph's transforms are applied.  All
-    meshes are opaque: transparency is refused, not dropped.
+    over; a file without colours gives the grey of `Mesh`.  An OBJ material's Kd is taken as written, its
+    d, Tr and map_d must leave it opaque; trimesh rounds glTF's baseColorFactor to 8 bits.  The scene graph's
+    transforms are applied.  All meshes are opaque: transparency is refused, not dropped.
 
     Parameters
     ----------
@@ -74,15 +78,18 @@ def load_meshes(
     import trimesh
 
     missing: list[str] = []
+    wrong: list[str] = []
     with wrapped(file, "mesh file"), file.open("rb") as stream:
         # allow_remote: a mesh must not make anyone fetch a texture from the network.
         scene = trimesh.load_scene(
             stream,
             file_type=file.suffix[1:].lower(),
-            resolver=_resolver(file, missing),
+            resolver=_resolver(file, missing, wrong),
             process=process,
             allow_remote=False,
         )
+        if wrong:
+            raise FormatError(wrong[0])
         placed = [(scene.graph.get(node)) for node in sorted(scene.graph.nodes_geometry)]
         parts = [(scene.geometry[name], np.asarray(matrix)) for matrix, name in placed]
         meshes = tuple(_mesh_of(file, part, matrix) for part, matrix in parts)
@@ -127,10 +134,10 @@ def _read_npz(file: Path, max_bytes: int) -> Mesh:
         return Mesh(**fields)
 
 
-def _resolver(file: Path, missing: list[str]) -> Foreign:
-    """Return trimesh's reader of the files that `file` names: inside its folder only, notes what is missing.
+def _resolver(file: Path, missing: list[str], wrong: list[str]) -> Foreign:
+    """Return trimesh's reader of the files that `file` names: inside its folder only, notes what is amiss.
 
-    trimesh itself logs a texture that it cannot read and goes on without.
+    trimesh itself logs a texture or a material file that it cannot read and goes on without.
     """
     from trimesh.resolvers import FilePathResolver
 
@@ -138,13 +145,38 @@ def _resolver(file: Path, missing: list[str]) -> Foreign:
         def get(self, name: str) -> bytes:
             for spelling in (name.strip(), unquote(name.strip())):
                 try:
-                    return path_inside(file, spelling).read_bytes()
+                    data = path_inside(file, spelling).read_bytes()
                 except (OSError, FormatError):
                     continue
+                if spelling.lower().endswith(".mtl"):
+                    wrong.extend(_problems_of_mtl(spelling, data))
+                return data
             missing.append(name)
             raise FileNotFoundError(name)
 
     return Beside(str(file))
+
+
+def _problems_of_mtl(name: str, data: bytes) -> list[str]:
+    """Return a sentence for each line for which trimesh would drop a colour, or all materials of the file."""
+    problems = []
+    for line in data.decode("utf-8", "replace").splitlines():
+        key, *words = line.split() or [""]
+        count = MTL_COUNTS.get(key.lower(), len(words))
+        if len(words) != count or (key.lower() in MTL_COUNTS and any(map(_is_word, words))):
+            message = (
+                f"{one_line(name)} must have {count} numbers for {key}, got {one_line(line.strip())!r}; "
+            )
+            problems.append(message + "mend it")
+    return problems
+
+
+def _is_word(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return True
+    return False
 
 
 def _mesh_of(file: Path, part: Foreign, matrix: Floats) -> Mesh:
@@ -166,28 +198,55 @@ def _appearance(file: Path, visual: Foreign) -> dict[str, Any]:
         return {}
     material = visual.material
     image = getattr(material, "baseColorTexture", None) or getattr(material, "image", None)
+    _check_material(file, material)
     if _is_made_up(material):
         return {}
-    tint = _tint(material)
+    tint = _tint(file, material)
     if image is None:
-        return {} if tint is None else {"colors": _opaque(file, tint)}
+        return {} if tint is None else {"colors": tint}
     if visual.uv is None:
         message = f"{file.name} must have texture coordinates for its texture, got none; export them"
         raise FormatError(message)
-    if tint is not None and (tint < 255).any():
-        message = f"{file.name} must not tint its texture, got the factor {tint.tolist()} of 255; "
+    if tint is not None and (tint != 1).any():
+        message = f"{file.name} must not tint its texture, got the factor {tint.tolist()}; "
         raise FormatError(message + "set it (Kd, baseColorFactor) to 1 or multiply it into the texture")
     codes = np.asarray(image.convert("RGBA"))
     return {"uv": np.asarray(visual.uv, dtype=np.float64), "texture": _opaque(file, codes)}
 
 
-def _tint(material: Foreign) -> Numbers | None:
-    """Return the colour (4,) in 0..255 that a material states, None if it states none."""
-    from trimesh.visual.color import DEFAULT_COLOR
+def _tint(file: Path, material: Foreign) -> Floats | None:
+    """Return the colour (3,) that a material states, None if it states none."""
+    factor = getattr(material, "baseColorFactor", None)
+    if factor is not None:
+        return _opaque(file, np.asarray(factor))
+    # Not `material.diffuse`: trimesh fills in a grey there where an OBJ material has no Kd.
+    stated = getattr(material, "kwargs", {}).get("kd")
+    if stated is None:
+        return None
+    color = np.asarray(stated, dtype=np.float64)
+    if ((color >= 0) & (color <= 1)).all():
+        return color
+    message = f"{file.name} must have a Kd of 3 numbers in 0..1, got {color.tolist()}; mend its .mtl file"
+    raise FormatError(message)
 
-    stated = getattr(material, "baseColorFactor", getattr(material, "diffuse", None))
-    # trimesh fills in this grey where an OBJ material has no Kd.
-    return None if stated is None or np.array_equal(stated, DEFAULT_COLOR) else np.asarray(stated)
+
+def _check_material(file: Path, material: Foreign) -> None:
+    """Refuse the transparency of an OBJ material, which trimesh does not read: d, Tr = 1 - d, and map_d."""
+    stated: dict[str, list[str]] = getattr(material, "kwargs", {})
+    for key, spelling, opaque in (("d", "d", 1.0), ("tr", "Tr", 0.0), ("map_d", "map_d", math.nan)):
+        # The last word: "d -halo 0.5" has an option before the number.
+        if key in stated and _number_in(stated[key][-1]) != opaque:
+            message = f"{file.name} must be opaque, got a material with {spelling} "
+            message += f"{one_line(' '.join(stated[key]))}; "
+            cure = f"remove {spelling}" if math.isnan(opaque) else f"set it to {opaque:g}"
+            raise FormatError(message + cure + " (meshes are opaque in this version)")
+
+
+def _number_in(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        return math.nan
 
 
 def _is_made_up(material: Foreign) -> bool:

@@ -120,6 +120,11 @@ def _header(nibabel: ModuleType, file: Path, head: bytes) -> Foreign:
     if bytes(header["magic"])[:3] not in (b"n+1", b"n+2"):
         message = f"{file.name} must be a NIfTI file in one piece (.nii), got a header of an .hdr/.img pair; "
         raise FormatError(message + "join them with nibabel.save")
+    # Four bytes of extension flags follow the header; nibabel lets an offset of 0 pass.
+    first, start = found[0] + 4, int(header.get_data_offset())
+    if start < first:
+        message = f"{file.name} must have its voxels at byte {first} or later (vox_offset), got {start}; "
+        raise FormatError(message + "write the file again")
     return header
 
 

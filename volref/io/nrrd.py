@@ -85,12 +85,9 @@ def placement_of_header(file: Path, header: dict[str, Any]) -> dict[str, Any]:
         affine[:3, :3] = _matrix(file, header["space directions"]).T
         affine[:3, 3] = header.get("space origin", np.zeros(3))
     else:
-        spacings = _axis_numbers(header, "spacings", 1.0)
-        first = _axis_numbers(header, "axis mins", 0.0)
-        # "axis min" is where the first sample begins if it is a cell, and where it lies if it is a node.
-        half = 0.5 * spacings if centering == "cell" and "axis mins" in header else np.zeros(3)
+        spacings, first = _axes(file, header, centering)
         affine[:3, :3] = np.diag(spacings)
-        affine[:3, 3] = first + half
+        affine[:3, 3] = first
     return {**placement_of_affine(affine, SIGNS[space]), "centering": centering}
 
 
@@ -140,9 +137,31 @@ def _matrix(file: Path, rows: object) -> Floats:
     raise FormatError(message + "save one scalar field with its 3 axes")
 
 
-def _axis_numbers(header: dict[str, Any], name: str, missing: float) -> Floats:
-    stated = np.array(header.get(name, [math.nan] * 3), dtype=np.float64)
-    return np.where(np.isnan(stated), missing, stated)
+def _axes(file: Path, header: dict[str, Any], centering: str) -> tuple[Floats, Floats]:
+    """Return the spacing and the place of the first sample on each axis of a header without directions.
+
+    A cell's "axis min" and "axis max" are the outer borders of the first and the last sample, a node's are
+    their places (Kindlmann, NRRD format, "axis mins").
+    """
+    stated = _axis_numbers(header, "spacings")
+    low, high = _axis_numbers(header, "axis mins"), _axis_numbers(header, "axis maxs")
+    steps = np.array(header["sizes"], dtype=np.float64) - (1.0 if centering == "node" else 0.0)
+    spread = (high - low) / np.maximum(steps, 1.0)
+    # 1e-5: people and programs write these numbers with 6 digits.
+    differ = np.abs(spread - stated) > 1e-5 * np.abs(stated)
+    if differ.any() or (np.isnan(low) & ~np.isnan(high)).any():
+        message = f"{file.name} must have axis maxs that agree with axis mins and spacings ({centering} "
+        message += f"centering), got {high.tolist()} for {low.tolist()} and {stated.tolist()}; "
+        raise FormatError(message + "remove axis maxs, or state the right centerings")
+    spacings = np.where(np.isnan(stated), spread, stated)
+    spacings = np.where(np.isnan(spacings), 1.0, spacings)
+    half = 0.5 * spacings if centering == "cell" else np.zeros(3)
+    return spacings, np.where(np.isnan(low), 0.0, low + half)
+
+
+def _axis_numbers(header: dict[str, Any], name: str) -> Floats:
+    """Return a number for each axis, NaN where the field states none; "axismins" is "axis mins"."""
+    return np.array(header.get(name, header.get(name.replace(" ", ""), [math.nan] * 3)), dtype=np.float64)
 
 
 def _single_name(file: Path, detached: str) -> str:
@@ -166,8 +185,11 @@ def _read_samples(
         message = f"{file.name} must have no line skip, got one; resave it with encoding raw or gzip"
         raise FormatError(message)
     encoding = str(header["encoding"]).lower()
+    if skip < -1:
+        message = f"{file.name} must have a byte skip of at least -1 (the samples end the file), got {skip}; "
+        raise FormatError(message + "resave it with encoding raw or gzip")
     if encoding == "raw":
-        skip = held - needed if skip == -1 else skip
+        skip = max(held - needed, 0) if skip == -1 else skip
         check_held(file, needed + skip, held, f"{what} after {skip}")
         return np.memmap(file, dtype, "r", start + skip, shape)
     if encoding not in ("gzip", "gz", "bzip2", "bz2") or skip != 0:

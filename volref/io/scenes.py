@@ -10,7 +10,7 @@ from typing import Any
 
 from volref.errors import FormatError
 from volref.io.atomic import check_free, write_text
-from volref.io.documents import FORMAT_VERSION, check_document, check_format
+from volref.io.documents import FORMAT_VERSION, check_document, check_format, whole_numbers
 from volref.io.guard import DEFAULT_MAX_BYTES, one_line, path_inside, read_json
 from volref.io.meshes import load_meshes, save_mesh
 from volref.io.npy import write_npy
@@ -47,6 +47,7 @@ def load_scene(path: str | Path, *, allow_outside: bool = False, max_bytes: int 
     document: Any = read_json(file)
     check_format(file, document, FORMAT)
     check_document(file, document)
+    document = whole_numbers(document)
 
     def beside(reference: dict[str, Any]) -> Path:
         return path_inside(file, reference["path"], allow_outside=allow_outside)

@@ -33,28 +33,33 @@ def load_transfer(
     *,
     domain: Sequence[float] | None = None,
     unit_distance: float | None = None,
-    texel_centers: bool = True,
-    interpolation: str = "opacity",
+    texel_centers: bool | None = None,
+    interpolation: str | None = None,
 ) -> TransferFunction:
     """Transfer function in a file: .json, or a lookup table of straight RGBA as .npy (n, 4) or PNG.
 
     A table needs `domain`, the values (first, last) it spreads over; `unit_distance` (default 1),
-    `texel_centers` and `interpolation` are as in `TransferFunction.from_lut`.  A PNG has one row of pixels,
-    or equal rows.  A JSON file states all that itself.
+    `texel_centers` (default True) and `interpolation` (default "opacity") are as in
+    `TransferFunction.from_lut`.  A PNG has one row of pixels, or equal rows.  A JSON file states all that
+    itself, and takes none of them.
 
     Raises
     ------
     FormatError
-        If the file is no transfer function.
+        If the file is no transfer function, or a JSON file is given what it states itself.
     SceneError
         If the transfer function breaks a rule.
     """
     file = existing_file(path)
     suffix = file.suffix.lower()
     if suffix == ".json":
-        if domain is not None or unit_distance is not None:
-            message = f"{file.name} must be loaded without domain and unit_distance, got {domain!r} and "
-            raise FormatError(message + f"{unit_distance!r}; change them in the file, which states them")
+        _refuse_options(
+            file,
+            domain=domain,
+            unit_distance=unit_distance,
+            texel_centers=texel_centers,
+            interpolation=interpolation,
+        )
         document = read_json(file)
         check_format(file, document, FORMAT)
         check_document(file, document, "transfer")
@@ -67,9 +72,12 @@ def load_transfer(
         raise FormatError(message)
     table = read_npy(file, LARGEST_TABLE_BYTES) if suffix == ".npy" else _table_of_png(file)
     first, last = float_array("transfer.domain", domain, (2,)).tolist()
-    length = 1.0 if unit_distance is None else unit_distance
     return TransferFunction.from_lut(
-        np.asarray(table), (first, last), length, texel_centers=texel_centers, interpolation=interpolation
+        np.asarray(table),
+        (first, last),
+        1.0 if unit_distance is None else unit_distance,
+        texel_centers=True if texel_centers is None else texel_centers,
+        interpolation="opacity" if interpolation is None else interpolation,
     )
 
 
@@ -115,6 +123,14 @@ def document_of_transfer(transfer: TransferFunction) -> dict[str, Any]:
     if transfer.opacity is not None:
         document["opacity"] = transfer.opacity.tolist()
     return document | {"unit_distance": transfer.unit_distance, "interpolation": transfer.interpolation}
+
+
+def _refuse_options(file: Path, **options: object) -> None:
+    """Refuse what only a table takes: a JSON file that a caller believes to have changed would mislead."""
+    for name, value in options.items():
+        if value is not None:
+            message = f"{file.name} must be loaded without {name}, which is for tables, got "
+            raise FormatError(message + f"{one_line(repr(value))}; change the file, which states all itself")
 
 
 def _table_of_png(file: Path) -> Numbers:

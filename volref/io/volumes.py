@@ -13,7 +13,8 @@ import numpy as np
 from volref.arrays import Numbers, whole_number
 from volref.errors import FormatError
 from volref.io.atlas import AtlasLayout, read_atlas
-from volref.io.guard import DEFAULT_MAX_BYTES, existing_file, nearest, one_line, read_json
+from volref.io.documents import whole_numbers
+from volref.io.guard import DEFAULT_MAX_BYTES, existing_file, nearest, one_line, read_json, wrapped
 from volref.io.nifti import read_nifti
 from volref.io.npy import chosen_array, npz_headers, read_npy, read_npz
 from volref.io.nrrd import read_nrrd
@@ -46,7 +47,8 @@ def load_volume(
     ======================  ==============================================================================
     .npy                    an array (nz, ny, nx), memory-mapped
     .npz                    array "volume" or the only one with 3 axes; "spacing" or "spacing_zyx",
-                            "origin", "direction", "centering", or "affine_ijk_to_ras_mm" / "..._lps_mm"
+                            "origin", "direction", "centering", or "affine_ijk_to_ras_mm" / "..._lps_mm";
+                            arrays that say the same twice must agree to 5 digits, and a matrix is taken
     .nrrd .nhdr             NRRD (extra `nrrd`)
     .nii .nii.gz            NIfTI (extra `nifti`)
     .raw .bin               needs size, dtype, byte_order, skip and spacing, see `load_raw`
@@ -103,7 +105,9 @@ def _sidecar(file: Path) -> Statement:
         return {}
     stated = read_json(beside)
     if isinstance(stated, dict):
-        return stated
+        # "size": [4.0, 3, 2] means the same as [4, 3, 2] in JSON.
+        whole: Statement = whole_numbers(stated, "volume")
+        return whole
     message = f"{beside.name} must hold a JSON object, got {type(stated).__name__}; write {{name: value}}"
     raise FormatError(message)
 
@@ -116,17 +120,36 @@ def _read_npz(file: Path, own: Statement, max_bytes: int) -> Found:
     name = chosen_array(file, npz_headers(file), own.get("key"), "volume", 3)
     values = read_npz(file, (name,), max_bytes)[name]
     said = read_npz(file, (*GEOMETRY, "spacing_zyx", *AFFINES), 2**20)
-    place: Statement = {key: said[key].tolist() for key in GEOMETRY if key in said}
-    if "spacing_zyx" in said and "spacing" not in place:
-        place["spacing"] = np.ravel(said["spacing_zyx"])[::-1].tolist()
+    places: dict[str, Statement] = {key: {key: said[key].tolist()} for key in GEOMETRY if key in said}
+    if "spacing_zyx" in said:
+        places["spacing_zyx"] = {"spacing": np.ravel(said["spacing_zyx"])[::-1].tolist()}
     for key, space in AFFINES.items():
         if key in said:
             affine = np.asarray(said[key])
             if affine.shape != (4, 4) or affine.dtype.kind not in "iuf":
                 message = f"{file.name} must hold {key} as 4 x 4 numbers, got {affine.dtype} of shape "
                 raise FormatError(message + f"{affine.shape}; save a matrix from (i, j, k) to the world")
-            place.update(placement_of_affine(affine, SIGNS[space]))
-    return values, place
+            places[key] = placement_of_affine(affine, SIGNS[space])
+    return values, _joined(file, places)
+
+
+def _joined(file: Path, places: dict[str, Statement]) -> Statement:
+    """Return what several arrays say of one place, the last (a matrix) as it is, if they do not differ."""
+    joined: Statement = {}
+    for name, said in places.items():
+        for key in joined.keys() & said.keys():
+            with wrapped(file, ".npz file"):
+                first, second = (np.asarray(value, dtype=np.float64) for value in (joined[key], said[key]))
+                # 1e-4: a number beside a matrix may be rounded to 5 digits.
+                same = first.shape == second.shape and bool(
+                    (np.abs(first - second) <= 1e-4 * np.abs(second).max()).all()
+                )
+            if not same:
+                message = f"{file.name} must state its {key} once, got {one_line(str(joined[key]))} and, by "
+                message += f"{name}, {one_line(str(said[key]))}; "
+                raise FormatError(message + "remove the array that is wrong")
+        joined |= said
+    return joined
 
 
 def _read_nrrd(file: Path, _: Statement, max_bytes: int) -> Found:
