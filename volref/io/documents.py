@@ -119,8 +119,10 @@ def _whole(value: Foreign, rule: Mapping[str, Any], definitions: Mapping[str, An
     if "$ref" in rule:
         return _whole(value, definitions[rule["$ref"].removeprefix("#/$defs/")], definitions)
     if "anyOf" in rule:
-        fitting = (branch for branch in rule["anyOf"] if find_problem(value, branch, definitions, "") is None)
-        return _whole(value, next(fitting, {}), definitions)
+        # One branch after the other: none calls a number what another calls an integer.
+        for branch in rule["anyOf"]:
+            value = _whole(value, branch, definitions)
+        return value
     if isinstance(value, dict):
         known = rule.get("properties", {})
         return {key: _whole(item, known.get(key, {}), definitions) for key, item in value.items()}

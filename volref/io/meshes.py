@@ -162,21 +162,11 @@ def _problems_of_mtl(name: str, data: bytes) -> list[str]:
     problems = []
     for line in data.decode("utf-8", "replace").splitlines():
         key, *words = line.split() or [""]
-        count = MTL_COUNTS.get(key.lower(), len(words))
-        if len(words) != count or (key.lower() in MTL_COUNTS and any(map(_is_word, words))):
-            message = (
-                f"{one_line(name)} must have {count} numbers for {key}, got {one_line(line.strip())!r}; "
-            )
-            problems.append(message + "mend it")
+        count = MTL_COUNTS.get(key.lower())
+        if count is not None and (len(words) != count or None in map(_number_in, words)):
+            message = f"{one_line(name)} must have {count} number{'s' * (count > 1)} for {key}, got "
+            problems.append(message + f"{one_line(line.strip())!r}; mend it")
     return problems
-
-
-def _is_word(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return True
-    return False
 
 
 def _mesh_of(file: Path, part: Foreign, matrix: Floats) -> Mesh:
@@ -242,11 +232,11 @@ def _check_material(file: Path, material: Foreign) -> None:
             raise FormatError(message + cure + " (meshes are opaque in this version)")
 
 
-def _number_in(text: str) -> float:
+def _number_in(text: str) -> float | None:
     try:
         return float(text)
     except ValueError:
-        return math.nan
+        return None
 
 
 def _is_made_up(material: Foreign) -> bool:

@@ -38,7 +38,7 @@ ACCUMULATED = slice(TRANSMITTANCE, 16)
 ROWS = 16
 
 # Where no more than this part of a block's samples is visible, only those are classified.
-MOST_VISIBLE = 0.75
+MOST_VISIBLE = 0.5
 
 
 @dataclass(frozen=True, eq=False)
