@@ -499,7 +499,7 @@ MESHES = [
     BadFile("Kd of one number", obj_of("Kd 0.5"), "mesh", ("a.mtl", "3 numbers for Kd", "'Kd 0.5'")),
     BadFile("Kd of a spectrum", obj_of("Kd spectral a.rfl"), "mesh", ("3 numbers for Kd", "a.rfl")),
     BadFile("Ka of two numbers", obj_of("Kd 1 0 0\nKa 1 0\nd 0.5"), "mesh", ("3 numbers for Ka", "mend it")),
-    BadFile("Ns of two numbers", obj_of("Kd 1 0 0\nNs 1 0\nd 0.5"), "mesh", ("1 numbers for Ns", "mend it")),
+    BadFile("Ns of two numbers", obj_of("Kd 1 0 0\nNs 1 0\nd 0.5"), "mesh", ("1 number for Ns", "mend it")),
     BadFile("Kd of NaN", obj_of("Kd nan 0 0"), "mesh", ("Kd of 3 numbers in 0..1", "nan")),
     BadFile("damaged GLB", file_of("a.glb", b"glTF" + b"\2\0\0\0" * 8), "mesh", ("readable mesh",)),
     BadFile("damaged STL", file_of("a.stl", b"solid" + b"\xff" * 100), "mesh", ("a.stl",)),
