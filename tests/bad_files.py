@@ -498,6 +498,7 @@ MESHES = [
     BadFile("Kd above 1", obj_of("Kd 255 0 0"), "mesh", ("a.obj", "Kd of 3 numbers in 0..1", "255.0")),
     BadFile("Kd of one number", obj_of("Kd 0.5"), "mesh", ("a.mtl", "3 numbers for Kd", "'Kd 0.5'")),
     BadFile("Kd of a spectrum", obj_of("Kd spectral a.rfl"), "mesh", ("3 numbers for Kd", "a.rfl")),
+    BadFile("Kd of words", obj_of("Kd xyz 0.1 0.2"), "mesh", ("3 numbers for Kd", "'Kd xyz 0.1 0.2'")),
     BadFile("Ka of two numbers", obj_of("Kd 1 0 0\nKa 1 0\nd 0.5"), "mesh", ("3 numbers for Ka", "mend it")),
     BadFile("Ns of two numbers", obj_of("Kd 1 0 0\nNs 1 0\nd 0.5"), "mesh", ("1 number for Ns", "mend it")),
     BadFile("Kd of NaN", obj_of("Kd nan 0 0"), "mesh", ("Kd of 3 numbers in 0..1", "nan")),
