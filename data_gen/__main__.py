@@ -10,7 +10,8 @@ from pathlib import Path
 from typing import NoReturn
 
 from data_gen.catalogue import CATALOGUE
-from data_gen.files import files_of, write_files
+from data_gen.files import write_items
+from volref.errors import FormatError
 
 
 class _Parser(argparse.ArgumentParser):
@@ -30,21 +31,20 @@ def main(arguments: Sequence[str] | None = None) -> int:
     problem = _problem(options)
     if problem:
         return _refuse(problem)
-    contents: dict[str, bytes] = {}
-    for name in options.names or CATALOGUE:
-        entry = CATALOGUE[name]
-        for stem, item in entry.make(options.seed).items():
-            contents |= files_of(stem, item, options.seed if entry.seeded else None)
+    items = {
+        stem: (CATALOGUE[name], item)
+        for name in options.names or CATALOGUE
+        for stem, item in CATALOGUE[name].make(options.seed).items()
+    }
     try:
-        paths = write_files(options.out, contents, force=options.force)
-    except FileExistsError as error:
+        for path in write_items(options.out, items, options.seed, force=options.force):
+            print(path)
+    except FormatError as error:
         return _refuse(str(error))
     except OSError as error:
         return _refuse(
             f"OUT must be a folder to write in, got {options.out} ({error.strerror}); choose another"
         )
-    for path in paths:
-        print(path)
     return 0
 
 

@@ -1,64 +1,80 @@
-"""Items as bytes, the same bytes for the same item, and files that appear whole or not at all."""
+"""Items as files: what volref reads comes from volref's own writers, so it loads with its placement."""
 
 import io
 import json
-import os
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from data_gen.catalogue import Item
-from volref.arrays import Floats, Integers, Numbers
+from data_gen.catalogue import Entry, Item
+from volref.arrays import Floats, Integers
 from volref.image import bytes_from_unit
+from volref.io import atomic_path, save_transfer, save_volume
+from volref.io.atomic import check_free
 from volref.phantoms.storms import CLEAR_DBZ, PolarScan, codes_from_dbz
 from volref.scene import Mesh, TransferFunction, Volume
 
 
-def files_of(stem: str, item: Item, seed: int | None) -> dict[str, bytes]:
-    """Return file names and contents of one item.
+def names_of(stem: str, item: Item) -> tuple[str, ...]:
+    """Return the names of the files of one item.
 
-    Volume: STEM.npy, array (nz, ny, nx), and STEM.json.  Radar: STEM.npz and STEM.json.  Mesh: STEM.ply, or
-    with a texture STEM.obj, .mtl and .png.  Transfer function: STEM.json.
+    Volume: STEM.npy, array (nz, ny, nx), and STEM.npy.json.  Radar: STEM.npz and STEM.npz.json.  Mesh:
+    STEM.ply, or with a texture STEM.obj, .mtl and .png.  Transfer function: STEM.json.  And for each
+    STEM.about.json: what it is, that it is made up, and its seed.
 
     Examples
     --------
-    >>> sorted(files_of("tiny", Volume(np.zeros((2, 2, 2))), None))
-    ['tiny.json', 'tiny.npy']
+    >>> names_of("tiny", Volume(np.zeros((2, 2, 2))))
+    ('tiny.about.json', 'tiny.npy', 'tiny.npy.json')
     """
     if isinstance(item, Volume):
-        return {f"{stem}.npy": _npy(item.values), f"{stem}.json": _json(_volume_record(stem, item, seed))}
-    if isinstance(item, PolarScan):
-        return {f"{stem}.npz": _polar_npz(item), f"{stem}.json": _json(_polar_record(stem, item, seed))}
-    if isinstance(item, TransferFunction):
-        return {f"{stem}.json": _json(_transfer_record(item))}
-    if item.texture is None:
-        return {f"{stem}.ply": ply_text(item.vertices, item.faces).encode()}
-    return _textured_obj(stem, item)
+        suffixes: tuple[str, ...] = (".npy", ".npy.json")
+    elif isinstance(item, PolarScan):
+        suffixes = (".npz", ".npz.json")
+    elif isinstance(item, TransferFunction):
+        suffixes = (".json",)
+    else:
+        suffixes = (".ply",) if item.texture is None else (".obj", ".mtl", ".png")
+    return tuple(stem + suffix for suffix in (".about.json", *suffixes))
 
 
-def write_files(folder: Path, contents: dict[str, bytes], *, force: bool) -> list[Path]:
-    """Write all files, each under a temporary name that is then renamed; return their paths.
+def write_items(
+    folder: Path, items: dict[str, tuple[Entry, Item]], seed: int, *, force: bool
+) -> Iterator[Path]:
+    """Write items by stem, each file whole or not at all, and yield the paths.
 
     Raises
     ------
-    FileExistsError
-        If one is there already and `force` is not given; then nothing is written.
+    FormatError
+        If one of the files is there already and `force` is not given; then nothing is written.
     """
-    paths = {name: folder / name for name in contents}
-    taken = [path for path in paths.values() if path.exists()]
-    if taken and not force:
-        message = f"{taken[0]} must not exist yet, got a file; pass --force to replace it"
-        raise FileExistsError(message)
+    for stem, (_, item) in items.items():
+        for name in names_of(stem, item):
+            check_free(folder / name, overwrite=force)
     folder.mkdir(parents=True, exist_ok=True)
-    for name, path in paths.items():
-        partial = folder / f".{name}.{os.getpid()}.partial"
-        try:
-            partial.write_bytes(contents[name])
-            partial.replace(path)
-        finally:
-            partial.unlink(missing_ok=True)
-    return list(paths.values())
+    for stem, (entry, item) in items.items():
+        about = {"about": entry.about, "made_up": True, "seed": seed if entry.seeded else None}
+        _write(folder / f"{stem}.about.json", _json(about), force=force)
+        _write_item(folder, stem, item, force=force)
+        yield from (folder / name for name in names_of(stem, item))
+
+
+def _write_item(folder: Path, stem: str, item: Item, *, force: bool) -> None:
+    if isinstance(item, Volume):
+        save_volume(item, folder / f"{stem}.npy", overwrite=force)
+    elif isinstance(item, TransferFunction):
+        save_transfer(item, folder / f"{stem}.json", overwrite=force)
+    else:
+        parts = _polar(stem, item) if isinstance(item, PolarScan) else _mesh(stem, item)
+        for name, content in parts.items():
+            _write(folder / name, content, force=force)
+
+
+def _write(path: Path, content: bytes, *, force: bool) -> None:
+    with atomic_path(path, overwrite=force) as temporary:
+        temporary.write_bytes(content)
 
 
 def ply_text(vertices: Floats, faces: Integers) -> str:
@@ -75,6 +91,12 @@ def ply_text(vertices: Floats, faces: Integers) -> str:
     points = [" ".join(map(repr, point)) for point in vertices.tolist()]
     corners = [" ".join(map(str, (3, *face))) for face in faces.tolist()]
     return "\n".join([*head, *points, *corners]) + "\n"
+
+
+def _mesh(stem: str, mesh: Mesh) -> dict[str, bytes]:
+    if mesh.texture is not None:
+        return _textured_obj(stem, mesh)
+    return {f"{stem}.ply": ply_text(mesh.vertices, mesh.faces).encode()}
 
 
 def _textured_obj(stem: str, mesh: Mesh) -> dict[str, bytes]:
@@ -96,40 +118,14 @@ def _textured_obj(stem: str, mesh: Mesh) -> dict[str, bytes]:
     }
 
 
-def _volume_record(stem: str, volume: Volume, seed: int | None) -> dict[str, Any]:
-    return {
-        "file": f"{stem}.npy",
-        "made_up": True,
-        "order": "zyx",
-        "spacing": list(volume.spacing),
-        "origin": list(volume.origin),
-        "direction": volume.direction.tolist(),
-        "centering": volume.centering,
-        "seed": seed,
-    }
-
-
-def _polar_record(stem: str, scan: PolarScan, seed: int | None) -> dict[str, Any]:
-    return {
-        "file": f"{stem}.npz",
-        "made_up": True,
+def _polar(stem: str, scan: PolarScan) -> dict[str, bytes]:
+    record = {
         "order": "sweep, azimuth, gate",
         "dbz": "code * gain + offset, code 0 undetected",
         "gain": 0.5,
         "offset": CLEAR_DBZ,
-        "time_s": scan.time_s.tolist(),
-        "seed": seed,
     }
-
-
-def _transfer_record(table: TransferFunction) -> dict[str, Any]:
-    assert table.extinction is not None
-    return {
-        "made_up": True,
-        "values": table.values.tolist(),
-        "colors": table.colors.tolist(),
-        "extinction": table.extinction.tolist(),
-    }
+    return {f"{stem}.npz": _polar_npz(scan), f"{stem}.npz.json": _json(record)}
 
 
 def _polar_npz(scan: PolarScan) -> bytes:
@@ -142,12 +138,6 @@ def _polar_npz(scan: PolarScan) -> bytes:
         time_s=scan.time_s,
         codes=codes_from_dbz(scan.dbz),
     )
-    return buffer.getvalue()
-
-
-def _npy(values: Numbers) -> bytes:
-    buffer = io.BytesIO()
-    np.save(buffer, values, allow_pickle=False)
     return buffer.getvalue()
 
 

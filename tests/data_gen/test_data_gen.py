@@ -1,15 +1,15 @@
 import hashlib
-import io
 import json
 
 import numpy as np
 import pytest
 import trimesh
 
+import volref as vr
 from data_gen.__main__ import main
 from data_gen.catalogue import CATALOGUE
-from data_gen.files import files_of
-from volref.phantoms import fields, meshes, storms
+from data_gen.files import write_items
+from volref.phantoms import fields, meshes, storms, transfer
 
 SMALL = ["linear_ramp", "gaussian_blobs", "filaments", "storm_box", "torus_mesh", "plane_mesh", "tf_spiky"]
 
@@ -30,29 +30,42 @@ def test_another_seed_changes_what_is_seeded_and_nothing_else(tmp_path):
     for seed in ("1", "2"):
         assert main([str(tmp_path / seed), "linear_ramp", "gaussian_blobs", "--seed", seed]) == 0
     one, two = digests(tmp_path / "1"), digests(tmp_path / "2")
-    assert {name for name in one if one[name] != two[name]} == {"gaussian_blobs.npy", "gaussian_blobs.json"}
+    assert {name for name in one if one[name] != two[name]} == {
+        "gaussian_blobs.npy",
+        "gaussian_blobs.about.json",
+    }
 
 
-def test_a_volume_comes_back_with_its_placement(tmp_path):
-    assert main([str(tmp_path), "marschner_lobb"]) == 0
-    want = fields.marschner_lobb()
-    record = json.loads((tmp_path / "marschner_lobb.json").read_text())
-    assert (np.load(tmp_path / record["file"]) == want.values).all()
-    assert record["spacing"] == list(want.spacing)
-    assert record["origin"] == list(want.origin)
-    assert record["centering"] == "node"
-    assert record["seed"] is None
+def test_what_is_written_loads_with_volref(tmp_path):
+    assert main([str(tmp_path), "marschner_lobb", "tf_spiky", "torus_mesh", "filaments"]) == 0
+    want, volume = fields.marschner_lobb(), vr.load_volume(tmp_path / "marschner_lobb.npy")
+    assert (volume.values == want.values).all()
+    assert (volume.spacing, volume.origin, volume.centering) == (want.spacing, want.origin, "node")
+    assert vr.load_volume(tmp_path / "filaments.npy").spacing == (1.0, 1.0, 2.0)
+    table = vr.load_transfer(tmp_path / "tf_spiky.json")
+    assert (table.extinction == transfer.spiky().extinction).all()
+    assert len(vr.load_mesh(tmp_path / "torus_mesh.ply").faces) == len(meshes.torus_mesh().faces)
 
 
-def test_a_radar_volume_comes_back_in_codes_and_in_the_same_bytes():
+def test_each_item_says_that_it_is_made_up_and_its_seed(tmp_path):
+    assert main([str(tmp_path), "marschner_lobb", "filaments", "--seed", "7"]) == 0
+    about = {
+        name: json.loads((tmp_path / f"{name}.about.json").read_text())
+        for name in ("marschner_lobb", "filaments")
+    }
+    assert all(record["made_up"] for record in about.values())
+    assert (about["marschner_lobb"]["seed"], about["filaments"]["seed"]) == (None, 7)
+
+
+def test_a_radar_volume_comes_back_in_codes(tmp_path):
     scan = storms.sample_polar(storms.make_storm(1), 600.0, azimuths=12, gates=20, gate_length=5000.0)
-    files = files_of("scan", scan, 1)
-    assert files == files_of("scan", scan, 1)
-    record = json.loads(files["scan.json"])
-    arrays = np.load(io.BytesIO(files["scan.npz"]))
+    list(write_items(tmp_path, {"scan": (CATALOGUE["storm_polar"], scan)}, 1, force=False))
+    record = json.loads((tmp_path / "scan.npz.json").read_text())
+    arrays = np.load(tmp_path / "scan.npz")
     dbz = arrays["codes"] * record["gain"] + record["offset"]
     assert np.abs(dbz - scan.dbz).max() <= 0.25 + 1e-12  # half a code, and its rounding
     assert (arrays["range_m"] == scan.range_m).all()
+    assert (arrays["time_s"] == scan.time_s).all()
 
 
 @pytest.mark.slow
@@ -75,14 +88,14 @@ def test_meshes_come_back_through_another_reader(tmp_path):
 
 
 def test_nothing_is_overwritten_unless_forced(tmp_path, capsys):
-    (tmp_path / "sphere.json").write_text("mine")
+    (tmp_path / "sphere.npy.json").write_text("mine")
     assert main([str(tmp_path), "linear_ramp", "sphere"]) == 2
-    assert capsys.readouterr().err == (
-        f"data_gen: {tmp_path / 'sphere.json'} must not exist yet, got a file; pass --force to replace it\n"
-    )
-    assert [path.name for path in tmp_path.iterdir()] == ["sphere.json"]
+    error = capsys.readouterr().err
+    assert "sphere.npy.json must not exist yet, got a file that does; choose another name" in error
+    assert error.count("\n") == 1
+    assert [path.name for path in tmp_path.iterdir()] == ["sphere.npy.json"]
     assert main([str(tmp_path), "sphere", "--force"]) == 0
-    assert (tmp_path / "sphere.json").read_text() != "mine"
+    assert (tmp_path / "sphere.npy.json").read_text() != "mine"
 
 
 def test_an_interrupted_write_leaves_no_file(tmp_path, monkeypatch):
