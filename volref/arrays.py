@@ -89,7 +89,7 @@ def float_array(name: str, value: ArrayLike | None, shape: ShapeRule, *, limit: 
         raise SceneError(message + "remove or replace it")
     if array.size and np.abs(array).max() > limit:
         message = f"{name} must lie within {limit:g} of 0, got {np.abs(array).max():g}; "
-        raise SceneError(message + "use another unit of length")
+        raise SceneError(message + "rescale it")
     array.flags.writeable = False
     return array
 

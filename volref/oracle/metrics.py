@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from volref.arrays import Booleans, Floats, float_array, one_of
+from volref.arrays import Booleans, Floats, float_array, one_of, plain_array
 from volref.errors import SceneError
 from volref.image import decode_srgb, encode_srgb
 
@@ -246,18 +246,13 @@ def _checked_pair(a: ArrayLike, b: ArrayLike) -> tuple[Floats, Floats]:
 
 
 def _checked_image(name: str, image: ArrayLike) -> Floats:
-    try:
-        axes = np.ndim(image)
-    except ValueError:  # rows of several lengths: float_array says so
-        axes = 3
-    array = float_array(name, image, ("height", "width", "channels") if axes == 3 else ("height", "width"))
+    axes = plain_array(name, image).ndim
+    shape = ("height", "width", "channels") if axes == 3 else ("height", "width")
+    array = float_array(name, image, shape, limit=LARGEST)
     array = array if array.ndim == 3 else array[..., None]
     if array.shape[2] not in CHANNELS or array.size == 0:
         message = f"{name} must have at least one pixel and 1, 3 or 4 channels, got shape {array.shape}; "
         raise SceneError(message + "reshape it")
-    if np.abs(array).max() > LARGEST:
-        message = f"{name} must hold numbers of at most {LARGEST:g}, got {np.abs(array).max():g}; scale it"
-        raise SceneError(message)
     return array
 
 
