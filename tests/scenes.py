@@ -28,6 +28,14 @@ def camera_towards(volume, direction=(1.1, 0.7, 0.9), fov_y=35.0, distance=2.5):
     return Camera.look_at(eye, center, (0, 0, 1), fov_y, size / 100, size * 10)
 
 
+def sparse_scene(side=32, size=24):
+    """A small visible cube in an empty volume: almost everything can be skipped."""
+    values = np.zeros((side, side, side))
+    values[8:12, 16:20, 16:20] = 1.0
+    volume = Volume(values)
+    return Scene(volume, colorful_transfer(), camera_towards(volume), size, size)
+
+
 def rough_scene(width=24, height=16, *, seed=0, transfer=None, background=(0.0, 0.0, 0.0, 0.0), **volume):
     field = rough_volume(seed, **volume)
     transfer = transfer or colorful_transfer(field.value_bounds[1])

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import volref as vr
-from tests.scenes import camera_towards, colorful_transfer, rough_scene
+from tests.scenes import camera_towards, colorful_transfer, rough_scene, sparse_scene
 
 
 def stage(plan, name):
@@ -51,12 +51,7 @@ def test_only_knots_that_the_volume_reaches_count_for_early_termination():
 
 
 def test_a_sparse_volume_has_empty_space_and_a_full_one_has_none():
-    values = np.zeros((32, 32, 32))
-    values[8:10, 8:10, 8:10] = 1.0
-    volume = vr.Volume(values)
-    assert vr.plan(vr.Scene(volume, colorful_transfer(), camera_towards(volume), 4, 4)).includes(
-        "empty space"
-    )
+    assert vr.plan(sparse_scene()).includes("empty space")
     assert not vr.plan(rough_scene(transfer=colorful_transfer(0.01))).includes("empty space")
 
 
@@ -70,10 +65,7 @@ def test_everything_forces_all_that_was_left_out():
 
 
 def test_a_plan_with_another_step_is_followed_and_skips_only_what_it_may():
-    values = np.zeros((32, 32, 32))
-    values[8:10, 8:10, 8:10] = 1.0
-    volume = vr.Volume(values)
-    scene = vr.Scene(volume, colorful_transfer(), camera_towards(volume), 24, 24)
+    scene = sparse_scene()
     plan = vr.plan(scene)
     for factor in (0.5, 2.0, 8.0):
         changed = dataclasses.replace(plan, step=plan.step * factor, termination=0.0)

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 import volref as vr
 from tests.oracles import scalar
-from tests.scenes import camera_towards, colorful_transfer, rough_scene, rough_volume
+from tests.scenes import camera_towards, colorful_transfer, rough_scene, rough_volume, sparse_scene
 from volref import planning
 from volref.phantoms import scenes as phantoms
 from volref.phantoms import transfer as phantom_tables
@@ -140,10 +140,7 @@ def test_skipping_empty_space_changes_nothing(seed, top):
 
 
 def test_empty_space_is_left_out_and_saves_samples():
-    values = np.zeros((40, 40, 40))
-    values[10:14, 20:24, 20:24] = 1.0
-    volume = vr.Volume(values)
-    scene = vr.Scene(volume, colorful_transfer(), camera_towards(volume), 32, 32)
+    scene = sparse_scene(40, 32)
     plan = vr.plan(scene)
     assert plan.includes("empty space")
     planned, everything = vr.render(scene, plan=plan), vr.render(scene, plan=plan.everything())
