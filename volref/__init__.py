@@ -41,6 +41,7 @@ if TYPE_CHECKING:
     from volref.truth.rendering import render
     from volref.truth.result import Render
     from volref.truth.tracing import Trace, trace
+    from volref.truth.verification import Verification, verify
 
 __version__ = "0.1.0"
 
@@ -56,6 +57,7 @@ __all__ = [
     "SceneError",
     "Trace",
     "TransferFunction",
+    "Verification",
     "Volume",
     "compare",
     "convert_volume",
@@ -75,6 +77,7 @@ __all__ = [
     "save_volume",
     "scene_schema",
     "trace",
+    "verify",
     "write_image",
 ]
 
@@ -87,6 +90,7 @@ _HOMES = {
     "volref.truth.rendering": ("render",),
     "volref.truth.result": ("Render",),
     "volref.truth.tracing": ("Trace", "trace"),
+    "volref.truth.verification": ("Verification", "verify"),
 }
 _HOME = dict.fromkeys(__all__, "volref.io") | {name: home for home, names in _HOMES.items() for name in names}
 

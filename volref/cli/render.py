@@ -19,7 +19,9 @@ from volref.cli.verb import DIFFERS, GOOD, Verb
 from volref.errors import FormatError
 
 if TYPE_CHECKING:
+    from volref.scene.scene import Scene
     from volref.truth.result import Render
+    from volref.truth.verification import Verification
 
 SUFFIXES = (".png", ".npy", ".npz")
 
@@ -36,6 +38,12 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         "linear); may be given several times",
     )
     add_accuracy(parser)
+    parser.add_argument(
+        "--verify",
+        type=int,
+        metavar="N",
+        help="integrate N random rays again at 30 digits, by another path, and compare (extra 'verify')",
+    )
     add_work(parser)
     add_force(parser)
     add_json(parser)
@@ -51,14 +59,23 @@ def _run(options: argparse.Namespace) -> int:
         out = render(scene, threads=options.threads, progress=show, **accuracy(options))
     for target in targets:
         out.save(target, overwrite=options.force)
+    checked = None if options.verify is None else _verified(scene, out, options)
     if options.json:
-        print_json(_figures(out, options.output))
+        print_json(_figures(out, options.output) | ({"verification": checked.as_dict()} if checked else {}))
     elif not options.quiet:
         note(_summary(out, options.output))
-    if out.met_tolerance:
-        return GOOD
-    note(_shortfall(out))
-    return DIFFERS
+    if checked is not None and not (options.quiet and checked.ok):
+        note(str(checked))
+    if not out.met_tolerance:
+        note(_shortfall(out))
+    return GOOD if out.met_tolerance and (checked is None or checked.ok) else DIFFERS
+
+
+def _verified(scene: "Scene", out: "Render", options: argparse.Namespace) -> "Verification":
+    from volref import verify
+
+    with progress("verify", quiet=options.quiet) as show:
+        return verify(scene, out, options.verify, progress=show)
 
 
 def _check_targets(targets: list[Path], *, force: bool) -> None:
@@ -128,8 +145,10 @@ VERB = Verb(
         ("render scene.json -o image.png -o image.npz --json", "also exact, with the figures as JSON"),
         ("render scene.json -o fine.npy --step 0.1 --tolerance 1/5000", "a finer step, a stricter tolerance"),
         ("render scene.json -o small.png --size 160x120 -j 1", "a quick look on one core"),
+        ("render scene.json -o image.npy --verify 64", "with 64 of its rays checked at 30 digits"),
     ),
     _arguments,
     _run,
-    notes="Exit status 1: the tolerance is not met.  The image is written all the same.",
+    notes="Exit status 1: the tolerance is not met, or a verified ray is outside its bound.  The image is "
+    "written all the same.",
 )

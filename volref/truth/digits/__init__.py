@@ -5,6 +5,4 @@
     pieces      a cell cut where the field turns or meets a knot
     series      optical depth and emission of a piece by Taylor series with a proven remainder
     integral    the conductor
-
-`docs/decisions/` says why it is done so; mpmath (the extra `verify`) does the arithmetic.
 """

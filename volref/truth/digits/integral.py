@@ -87,7 +87,7 @@ def ray_integral(
 
     ray = exact_point(origin), exact_point(direction)
     low, high = volume.index_bounds
-    span = exact_span(*ray, exact_point(low), exact_point(high), distance)
+    span = exact_span(*ray, exact_point(low.tolist()), exact_point(high.tolist()), distance)
     if span is None:
         return RayIntegral(tuple(map(mp.mpf, behind)), 0.0, 0)
     brightest = max(1.0, float(transfer.colors.max()), *behind)

@@ -9,7 +9,7 @@ Positions are (x, y, z) in index space, where a sample has whole numbers; t are 
 """
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from fractions import Fraction
 from itertools import pairwise
 from typing import TypeAlias
@@ -21,7 +21,7 @@ Cubic: TypeAlias = tuple[Fraction, Fraction, Fraction, Fraction]
 Index: TypeAlias = tuple[int, int, int]
 
 
-def exact_point(numbers: Sequence[float]) -> Point:
+def exact_point(numbers: Iterable[float]) -> Point:
     """Return three float64 numbers as fractions."""
     x, y, z = (Fraction(float(number)) for number in numbers)
     return x, y, z
@@ -112,9 +112,7 @@ def cubic_in_cell(
     b, c, d = v100 - v000, v010 - v000, v001 - v000
     e, p, q = v110 - v100 - c, v011 - v001 - c, v101 - v001 - b
     r = (v111 - v011 - v101 + v001) - e
-    f, g, h = (
-        (o + d * t0 - i, d * (t1 - t0)) for o, d, i in zip(origin, direction, cell, strict=True)
-    )
+    f, g, h = ((o + d * t0 - i, d * (t1 - t0)) for o, d, i in zip(origin, direction, cell, strict=True))
     fg = _product(f, g)
     total = [v000, Fraction(0), Fraction(0), Fraction(0)]
     for factor, polynomial in (

@@ -13,14 +13,15 @@ T (c(s(0)) (1 - exp(-depth)) + (dc/ds) moment).
 
 Remainder.  On the disc |z| <= rho let X be the sum of the sizes of the terms of
 (1 - opacity(z)) / (1 - opacity(0)) - 1, 0 for extinctions, and V that of (dc/ds) (s - s(0)).  If X < 1,
-then g is at most G = |r0| + (|r1| rho + |r2| rho^2 + |r3| rho^3) / (1 - X), where r are the rates: the
+then |g| is at most G = |r0| + (|r1| rho + |r2| rho^2 + |r3| rho^3) / (1 - X), where r are the rates: the
 coefficients of g itself for extinctions, g(0) and those of (l / d) opacity / (1 - opacity(0)) for
 opacities, as log(1 - opacity) is log(1 + x) with |x| <= X.  And E is at most exp(rho G).  By Cauchy's
 estimate the terms beyond z^n of a function that is at most M on the disc add to its integral from -1 to 1
-no more than M rho^-n / (rho - 1).  Here M = V G exp(rho G) for the moment, and M = G for the depth, whose
-error any channel feels at most times the brightest colour B in sight; n is chosen so that
+no more than M rho^-n / (rho - 1).  M = V G exp(rho G) for the moment.  M = G for the depth, whose error
+any channel feels at most times the brightest colour B in sight, and, as it makes E(0) wrong, at most times V
+in the moment.  So n is chosen such that
 
-    (B + V) G exp(rho G) rho^-n / (rho - 1) <= tolerance max(G(1), SHARE (depth in front))
+    (B + 2 V) G exp(rho G) rho^-n / (rho - 1) <= tolerance B max(G(1), SHARE (depth in front))
 
 at the best of some rho.  G(1) is little more than the depth of the step, so the remainder of a whole ray
 is relative to its depth: the faintest keep their digits.
@@ -106,21 +107,20 @@ def taylor_step(
         return None
     if not most:
         return Step(mp.zero, mp.zero, mp.zero)
-    remainder = medium.tolerance * max(most, depth_before * SHARE)
+    allowed = medium.tolerance * max(most, depth_before * SHARE)
     steepest = max(map(abs, interval.color_slope))
     order = _order(
-        medium.brightest,
         float(most),
-        [float(size / remainder) for size in sizes],
+        [float(size / allowed) for size in sizes],
         [float(bend) for bend in bends],
-        [float(steepest * abs(s)) for s in value[1:]],
+        [float(steepest * abs(s) / medium.brightest) for s in value[1:]],
     )
-    series = [to_fixed(mp, rate / most) for rate in rates]
+    series = [_to_fixed(mp, rate / most) for rate in rates]
     if any(x):
         series = _logarithm(mp, series, x, order)
     depth = most * _rounded(mp, sum(2 * term // (k + 1) for k, term in enumerate(series) if k % 2 == 0))
     moment = _moment(mp, value, series, most, order) if steepest else mp.zero
-    return Step(depth, moment, remainder)
+    return Step(depth, moment, allowed * medium.brightest)
 
 
 def edge_step(mp: Context, medium: Medium, value: Sequence[Number], length: Number) -> Step | None:
@@ -138,27 +138,26 @@ def edge_step(mp: Context, medium: Medium, value: Sequence[Number], length: Numb
         clear = 1 - interval.strength_at(((value[3] * z + value[2]) * z + value[1]) * z + value[0])
         return -scale * mp.log(max(clear, tiny))
 
-    if change * min(1, rate(mp.zero)) > medium.tolerance:
+    allowed = medium.tolerance * medium.brightest
+    if change * min(1, rate(mp.zero)) > allowed:
         return None
     depth = mp.quad(rate, [-1, 1])
     remainder = -change * mp.expm1(-depth)
-    return Step(depth, mp.zero, remainder) if remainder <= medium.tolerance else None
+    return Step(depth, mp.zero, remainder) if remainder <= allowed else None
 
 
-def _order(
-    brightest: float, most: float, shares: Sequence[float], bends: Sequence[float], changes: Sequence[float]
-) -> int:
+def _order(most: float, shares: Sequence[float], bends: Sequence[float], changes: Sequence[float]) -> int:
     """Return the power n to which the series are taken.
 
-    G(1) is `most`; `shares` (4,) are the sizes of the rates divided by what the remainder may be; `bends`
-    and `changes` (3,) are the sizes of the terms of X and V from the first power on.
+    G(1) is `most`; `shares` (4,) are the sizes of the rates divided by what the remainder may be, over B;
+    `bends` and `changes` (3,) are the sizes of the terms of X and V / B from the first power on.
     """
-    orders = []
+    orders: list[float] = []
     for rho in RHOS:
         bend = _at(rho, bends)
         if bend < 1:
             share = shares[0] + _at(rho, shares[1:]) / (1 - bend)
-            bound = (brightest + _at(rho, changes)) * share / (rho - 1)
+            bound = (1 + 2 * _at(rho, changes)) * share / (rho - 1)
             growth = share / (shares[0] + sum(shares[1:]) / (1 - sum(bends)))
             orders.append((math.log(bound) + rho * growth * most) / math.log(rho))
     return max(1, math.ceil(min(orders)))
@@ -169,13 +168,12 @@ def _at(rho: float, terms: Sequence[Number]) -> Number:
     return ((terms[2] * rho + terms[1]) * rho + terms[0]) * rho
 
 
-def to_fixed(mp: Context, number: Number) -> int:
+def _to_fixed(mp: Context, number: Number) -> int:
     """Return a number in fixed point: as a whole number of 2^-prec, prec the context's precision in bits.
 
     Python's whole numbers are ten times as fast as mpmath's, and all numbers of the series are near 1.
     """
-    whole: int = number.to_fixed(mp.prec)
-    return whole
+    return int(number.to_fixed(mp.prec))
 
 
 def _rounded(mp: Context, fixed: int) -> Number:
@@ -188,7 +186,7 @@ def _logarithm(mp: Context, rates: Sequence[int], x: Sequence[Number], order: in
     `rates` are r0, r x0, r x1, r x2.  From q' (1 + x) = x' for q = log(1 + x):
     k q_k = k x_k - sum over j of x_j (k - j) q_(k-j).
     """
-    factors = [to_fixed(mp, term) for term in x]
+    factors = [_to_fixed(mp, term) for term in x]
     slope: list[int] = []  # k r q_k, from k = 1 on
     for k in range(1, order + 1):
         inner = sum(map(operator.mul, factors, reversed(slope))) >> mp.prec
@@ -206,12 +204,12 @@ def _moment(mp: Context, value: Sequence[Number], series: Sequence[int], most: N
     if not far:
         return mp.zero
     before = sum((term if k % 2 == 0 else -term) // (k + 1) for k, term in enumerate(series))
-    transmittance, emitted = [to_fixed(mp, mp.exp(-most * _rounded(mp, before)))], []  # E, and g E / most
-    prec, scale = mp.prec, to_fixed(mp, most)
+    transmittance, emitted = [_to_fixed(mp, mp.exp(-most * _rounded(mp, before)))], []  # E, and g E / most
+    prec, scale = mp.prec, _to_fixed(mp, most)
     for k in range(order):
         emitted.append(sum(map(operator.mul, series, reversed(transmittance))) >> prec)
         transmittance.append(-(scale * emitted[k] >> prec) // (k + 1))
-    away = [to_fixed(mp, s / far) for s in value[1:]]
+    away = [_to_fixed(mp, s / far) for s in value[1:]]
     moment = sum(
         2 * sum(map(operator.mul, away, reversed(emitted[:power]))) // (power + 1)
         for power in range(2, order + 1, 2)
