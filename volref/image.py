@@ -62,6 +62,32 @@ def bytes_from_unit(unit: Floats) -> Bytes:
     return np.rint(np.clip(unit, 0.0, 1.0) * 255.0).astype(np.uint8)
 
 
+def bytes24_from_unit(unit: Floats) -> Bytes:
+    """Quantise 0..1 to 0..2^24 - 1 and return the three bytes (..., 3) of each, the highest first.
+
+    A whole number is split, not a fraction: 1 stays 1, where fract(v (1, 256, 65536)) packs it as 0.
+
+    Examples
+    --------
+    >>> bytes24_from_unit(np.array([0.0, 0.5, 1.0])).tolist()
+    [[0, 0, 0], [128, 0, 0], [255, 255, 255]]
+    """
+    code = np.rint(np.clip(unit, 0.0, 1.0) * (2**24 - 1)).astype(np.uint32)
+    return np.stack([code >> 16, code >> 8 & 255, code & 255], axis=-1).astype(np.uint8)
+
+
+def unit_from_bytes24(codes: Bytes) -> Floats:
+    """Return 0..1 of three bytes (..., 3), the highest first; undoes `bytes24_from_unit` to 3e-8.
+
+    Examples
+    --------
+    >>> unit_from_bytes24(np.array([[255, 255, 255]], np.uint8)).tolist()
+    [1.0]
+    """
+    high, middle, low = np.moveaxis(codes.astype(np.uint32), -1, 0)
+    return np.asarray((high << 16 | middle << 8 | low) / (2**24 - 1))
+
+
 def encode_rgba8(rgba: Floats, encoding: str = "srgb") -> Bytes:
     """Return straight 8-bit RGBA (..., 4) of a premultiplied working-space image.
 

@@ -12,12 +12,22 @@ import sys
 from collections.abc import Sequence
 from typing import NoReturn
 
-from volref.cli import compare, convert, demo, info, plan, render, report, trace
+from volref.cli import compare, convert, demo, info, plan, render, report, stability, trace
 from volref.cli.output import refuse
 from volref.cli.verb import BAD_USE, GOOD, example_lines
 from volref.errors import FormatError, SceneError
 
-VERBS = (demo.VERB, render.VERB, plan.VERB, trace.VERB, compare.VERB, info.VERB, convert.VERB, report.VERB)
+VERBS = (
+    demo.VERB,
+    render.VERB,
+    plan.VERB,
+    trace.VERB,
+    compare.VERB,
+    info.VERB,
+    convert.VERB,
+    stability.VERB,
+    report.VERB,
+)
 
 # As a shell reports a program that the signals SIGINT and SIGPIPE ended.
 INTERRUPTED, BROKEN_PIPE = 128 + 2, 128 + 13
@@ -36,6 +46,14 @@ STATUSES = "exit status: 0 good, 1 differs or tolerance not met, 2 bad use (one 
 
 class UsageError(Exception):
     """Words that do not make a command; the message is one line."""
+
+
+class VerbHelp(argparse.RawDescriptionHelpFormatter):
+    """A help text whose first column holds every verb; argparse forgets that verbs are indented by 4."""
+
+    def __init__(self, prog: str) -> None:
+        super().__init__(prog)
+        self._action_max_length = 4 + max(len(verb.name) for verb in VERBS)
 
 
 class Parser(argparse.ArgumentParser):
@@ -94,7 +112,7 @@ def build_parser() -> tuple[Parser, dict[str, Parser]]:
         prog="volref",
         description=PURPOSE,
         epilog=f"examples:\n{example_lines(EXAMPLES)}\n\n`volref VERB --help` has more.  {STATUSES}",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
+        formatter_class=VerbHelp,
         allow_abbrev=False,
     )
     parser.add_argument("--version", action="version", version=f"volref {__version__}")
