@@ -46,9 +46,7 @@ def trilinear(volume, origin, direction, t):
         share = mpf(1)
         for bit, f in zip(bits, fractions, strict=True):
             share *= f if bit else 1 - f
-        x, y, z = (
-            min(max(c + bit, 0), n - 1) for c, bit, n in zip(cells, bits, volume.size, strict=True)
-        )
+        x, y, z = (min(max(c + bit, 0), n - 1) for c, bit, n in zip(cells, bits, volume.size, strict=True))
         total += share * mpf(float(volume.values[z, y, x]))
     return total
 

@@ -65,7 +65,7 @@ class Verification:
     >>> checked = Verification(
     ...     pixels, np.zeros((3, 4)), errors, bounds, np.zeros(3), "certified", 30, 0.5
     ... )
-    >>> checked.ok, checked.within.tolist(), checked.ratio.tolist()
+    >>> checked.ok, checked.within.tolist(), checked.ratio.round(9).tolist()
     (False, [True, True, False], [0.1, 0.0, 3.0])
     """
 
