@@ -101,13 +101,28 @@ def _early_end() -> Measured:
 
 
 def _opaque_at_once() -> Measured:
-    """Take opacity 1 in the whole volume: it shows the table's colour, and nothing of the background."""
+    """Take opacity 1 in the whole volume, per length of 1 and of 100: nothing of the background shows."""
     volume = Volume(np.full((4, 4, 4), 0.5), origin=(-1.5, -1.5, -1.5))
-    table = TransferFunction([0, 1], [COLOR, COLOR], opacity=[1.0, 1.0])
-    scene = Scene(volume, table, _oblique(), 8, 8, background=(0.2, 0.2, 0.2, 1.0))
+    background = (0.2, 0.2, 0.2, 1.0)
     inside = separable_image(Scene(volume, one_value(1.0), _oblique(), 8, 8))[..., 3:] > 0
-    truth = np.where(inside, (*COLOR, 1.0), (0.2, 0.2, 0.2, 1.0))
-    return known([scene], truth, march=rounding(1))
+    scenes = [
+        Scene(volume, TransferFunction([0.5], [COLOR], None, [1.0], unit), _oblique(), 8, 8, (), background)
+        for unit in (1.0, 100.0)
+    ]
+    truth = np.where(inside, (*COLOR, 1.0), background)
+    return known(scenes, np.stack([truth, truth]), march=rounding(1))
+
+
+def _jump_to_opaque() -> Measured:
+    """Let a ramp from 0 to 1 over a way of 8 jump to opacity 1 at 0.55, from an opacity of 0.2 and blue."""
+    volume = linear_ramp((2, 2, 9), low=1.0, high=0.0)
+    blue = (0.1, 0.2, 1.0)
+    table = TransferFunction([0.55, 0.55], [blue, COLOR], opacity=[0.2, 1.0])
+    scene = Scene(volume, table, _down(), 4, 4)
+    front = closed.linear_opacity(blue, 0.2, 0.2, 0.55 * 8)
+    truth = np.tile(closed.over(front, np.array([*COLOR, 1.0])), (16, 1))
+    step = 1 / 64
+    return known([scene], truth, step=step, march=1 - 0.8**step)
 
 
 def _toward_opacity_one() -> Measured:
@@ -242,11 +257,20 @@ CASES = (
     Case(
         "opacity-1-throughout",
         FAMILY,
-        "With opacity 1 in all of the volume, is the background hidden to the last bit?",
+        "With opacity 1 in all of the volume, per length of 1 or of 100, is the background hidden?",
         "the table's colour on the box, the background beside it",
         f"{SHADER}: log(1 - 1)",
         f"march: {ROUNDING}.  exact: {CERTIFICATE}",
         _opaque_at_once,
+    ),
+    Case(
+        "jump-to-opacity-1",
+        FAMILY,
+        "Where the table jumps from opacity 0.2 to 1, does the ray end there, in the colour that it meets?",
+        "1 - 0.8^4.4 of blue over the opaque colour",
+        f"{SHADER}: the surface lies within a step",
+        f"march: the opacity, 1 - 0.8^step, of the step in which the jump lies.  exact: {CERTIFICATE}",
+        _jump_to_opaque,
     ),
     Case(
         "opacity-0-to-1-along-the-ray",
