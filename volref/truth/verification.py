@@ -157,7 +157,7 @@ class Verification:
         head = (
             f"verified {count} ray{'s' * (count > 1)} at {self.digits} digits in {self.seconds:.1f} s: "
             f"error {self.largest_error:.3g} at most, {self.median_error:.3g} in the median; "
-            f"{self.share_within:.6g} of them within the bound ({self.bound_kind})"
+            f"{np.count_nonzero(self.within)} of {count} within the bound ({self.bound_kind})"
         )
         lines = [head, f"  {'x':>6}{'y':>6}{'error':>12}{'bound':>12}{'error/bound':>13}"]
         worst = np.argsort(-np.nan_to_num(self.ratio, nan=np.inf), kind="stable")[:SHOWN]
