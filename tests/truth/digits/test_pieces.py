@@ -8,7 +8,7 @@ from mpmath import mp, mpf
 from volref.truth.digits.pieces import evaluate, meeting, monotone_pieces, turning_points
 
 coefficient = st.floats(-2, 2) | st.sampled_from([0.0, 1e-30, 1e-300, 1.0])
-KNOTS = tuple(k / 4 for k in range(-24, 25))
+KNOTS = tuple(k / 4 for k in range(-36, 37))  # beyond all values: at most 8 in size
 ROUNDING = mpf(10) ** -55  # of cubics with coefficients up to 2, at 60 digits
 
 
