@@ -80,7 +80,7 @@ def test_a_step_that_is_no_length_is_refused(step):
 
 
 def test_an_unknown_method_is_refused():
-    with pytest.raises(vr.SceneError, match="method must be 'march', got 'euler'"):
+    with pytest.raises(vr.SceneError, match="method must be 'auto' or 'march' or 'exact', got 'euler'"):
         vr.plan(rough_scene(), method="euler")
 
 

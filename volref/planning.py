@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from volref.arrays import Booleans, Floats, number
+from volref.arrays import Booleans, Floats, number, one_of
 from volref.errors import SceneError
 from volref.scene.blocks import block_ranges
 from volref.scene.scene import Scene
@@ -73,9 +73,10 @@ class Plan:
     scene
         The scene it was made for; it holds for other cameras, image sizes and backgrounds too.
     method
-        "march": midpoint rule at a uniform step.
+        "march": midpoint rule at a uniform step; "exact": pieces inside cells, with a proven bound; "auto":
+        `render` measures which of the two is cheaper.
     step
-        Length of a segment in world units; 0 without a volume.
+        Length of a segment in world units; 0 without a volume, and where the method has none.
     tolerance
         The error per pixel that the result is compared with.
     termination
@@ -158,12 +159,32 @@ class Plan:
 SHORTCUTS = ("empty space", "early termination")
 
 
+METHODS = ("auto", "march", "exact")
+
+
 def plan(
-    scene: Scene, *, method: str = "march", step: float | None = None, tolerance: float = HALF_LEVEL
+    scene: Scene,
+    *,
+    method: str = "march",
+    step: float | None = None,
+    tolerance: float = HALF_LEVEL,
+    certified: bool = True,
 ) -> Plan:
     """Decide what rendering `scene` takes, from the scene alone.
 
-    `step` is in world units and defaults to half the least spacing of the volume.
+    Parameters
+    ----------
+    scene
+        What to draw.
+    method
+        "march", "exact", or "auto": the cheapest whose proven bound meets the tolerance, which is "exact"; if
+        an estimate may do (`certified=False`), `volref.render` measures which is cheaper.
+    step
+        Of "march", in world units; default half the least spacing of the volume.
+    tolerance
+        The error per pixel that is asked for.
+    certified
+        Whether the bound has to be proven.
 
     Raises
     ------
@@ -174,16 +195,21 @@ def plan(
     if not isinstance(scene, Scene):
         message = f"scene must be a volref.Scene, got {type(scene).__name__}; build or load one first"
         raise SceneError(message)
-    if method != "march":
-        message = f"method must be 'march', got {method!r}; this version has no other"
-        raise SceneError(message)
+    one_of("method", method, METHODS)
     number("tolerance", tolerance, above=0)
+    if method == "auto" and certified:
+        method = "exact"
+    if method != "march":
+        if step is not None:
+            message = f"step must be left out unless method is 'march', got {step!r}; pass method='march' too"
+            raise SceneError(message)
+        return _stepless(scene, method, tolerance)
     stages = [_meshes_stage(scene)]
     if scene.volume is None or scene.transfer is None:
         stages.append(Stage("volume", included=False, reason="the scene has none"))
         return Plan(scene, method, 0.0, tolerance, 0.0, 0, None, (*stages, _background_stage(scene)))
     length, most_segments = _step_length(scene.volume, step)
-    seen = bool(_may_be_seen(scene.transfer, *map(np.array, scene.volume.value_bounds)))
+    seen = bool(may_be_seen(scene.transfer, *map(np.array, scene.volume.value_bounds)))
     stages.append(_volume_stage(scene.volume, seen=seen))
     if not seen:
         return Plan(scene, method, length, tolerance, 0.0, 0, None, (*stages, _background_stage(scene)))
@@ -192,6 +218,21 @@ def plan(
     termination, stage = _early_termination(scene.volume, scene.transfer)
     stages.extend([stage, _background_stage(scene)])
     return Plan(scene, method, length, tolerance, termination, most_segments, occupancy, tuple(stages))
+
+
+def _stepless(scene: Scene, method: str, tolerance: float) -> Plan:
+    """Return the plan of a method that chooses its own steps."""
+    stages = [_meshes_stage(scene)]
+    if scene.volume is None or scene.transfer is None:
+        stages.append(Stage("volume", included=False, reason="the scene has none"))
+    else:
+        seen = bool(may_be_seen(scene.transfer, *map(np.array, scene.volume.value_bounds)))
+        stages.append(_volume_stage(scene.volume, seen=seen))
+        if seen:
+            reason = "cells that are transparent are not integrated"
+            stages.append(Stage("empty space", included=True, reason=reason))
+    stages.append(_background_stage(scene))
+    return Plan(scene, method, 0.0, tolerance, 0.0, 0, None, tuple(stages))
 
 
 def _meshes_stage(scene: Scene) -> Stage:
@@ -250,7 +291,7 @@ def _empty_space(volume: Volume, transfer: TransferFunction, step: float) -> tup
     if max(x, y, z) > max(volume.size):
         return None, Stage(name, included=False, reason="one block of segments is longer than the volume")
     low, high = block_ranges(volume, BLOCK, (x, y, z))
-    occupied = _may_be_seen(transfer, low, high)
+    occupied = may_be_seen(transfer, low, high)
     empty = 1 - float(occupied.mean())
     saved = f"{empty:.0%} of the {BLOCK}^3 blocks are transparent with their surroundings"
     if empty < LEAST_EMPTY_PART:
@@ -261,7 +302,7 @@ def _empty_space(volume: Volume, transfer: TransferFunction, step: float) -> tup
     return Occupancy(blocks, layers, half), Stage(name, included=True, reason=f"{saved}: no samples there")
 
 
-def _may_be_seen(transfer: TransferFunction, low: Floats, high: Floats) -> Booleans:
+def may_be_seen(transfer: TransferFunction, low: Floats, high: Floats) -> Booleans:
     """Tell whether anything interpolated between samples from `low` to `high` can have an opacity above 0.
 
     Interpolation may leave the range of its corners by rounding, unless they are all one value.

@@ -5,7 +5,7 @@ R rays.  Distances t are in world units along unit directions from the ray's ori
 
 from dataclasses import dataclass
 
-from volref.arrays import Floats, Integers
+from volref.arrays import Floats, Indices, Integers
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,3 +38,37 @@ class Surface:
     color: Floats
     mesh: Integers
     face: Integers
+
+
+@dataclass(frozen=True, eq=False)
+class Pieces:
+    """n parts of rays, front to back along each ray, ray after ray; gaps between them are transparent.
+
+    ray (n,): index of the ray in its chunk, rising.
+    length (n,): world length.
+    cubic (4, n): the value along the piece is the sum of cubic[j] v^j, from v = -1/2 (near) to 1/2 (far).
+    slack (n,): how far the true value may be from that, but for the share `astray` (n,) of the piece, which may
+    lie in the next cell.
+    row (n,): the row of the models that holds on the piece, or -1 where it is yet to be found.
+    edge (n,): the share of the piece where the value is within `slack` of the ends of that row, if exact.
+    """
+
+    ray: Indices
+    length: Floats
+    cubic: Floats
+    slack: Floats
+    astray: Floats
+    row: Indices
+    edge: Floats
+
+    def take(self, chosen: Indices) -> "Pieces":
+        """Return the pieces at the indices `chosen`."""
+        return Pieces(
+            self.ray.take(chosen),
+            self.length.take(chosen),
+            self.cubic.take(chosen, axis=1),
+            self.slack.take(chosen),
+            self.astray.take(chosen),
+            self.row.take(chosen),
+            self.edge.take(chosen),
+        )

@@ -9,11 +9,12 @@ from concurrent.futures import ThreadPoolExecutor, as_completed
 import numpy as np
 
 from volref import planning
-from volref.arrays import Floats, Indices, whole_number
+from volref.arrays import Floats, Indices, number, whole_number
 from volref.errors import SceneError
 from volref.planning import HALF_LEVEL, RAYS_PER_CHUNK, Plan
 from volref.records import Surface
 from volref.scene.scene import Scene
+from volref.truth.exact import integrate_pixels, prepare
 from volref.truth.march import field_of, march_chunk
 from volref.truth.result import Render
 from volref.truth.surfaces import visible_surface
@@ -22,33 +23,48 @@ from volref.workspace import Workspace
 # Called now and then with (chunks done, chunks in all).
 Progress = Callable[[int, int], None]
 
+# The exact integrator takes the rays of a tile together: they go through the same cells.
+TILE_WIDTH, TILE_HEIGHT = 32, 16
+
+# What becomes of a chunk's pixels: rgba (R, 4), bound (R,), values interpolated or pieces integrated.
+Integrator = Callable[[Indices, Workspace], tuple[Floats, Floats, int]]
+
 
 def render(
     scene: Scene,
     *,
     method: str = "march",
     tolerance: float = HALF_LEVEL,
+    certified: bool = True,
     step: float | None = None,
     threads: int | None = None,
     progress: Progress | None = None,
+    max_seconds: float | None = None,
     plan: Plan | None = None,
 ) -> Render:
-    """Return the image of `scene` with an estimate of its error per pixel.
+    """Return the image of `scene` with a bound on its error per pixel.
 
     Parameters
     ----------
     scene
         What to draw.
     method
-        "march": the midpoint rule in float64 with exponential opacities at a uniform step.
+        "march": the midpoint rule in float64 with exponential opacities at a uniform step, and an estimate of
+        its error.  "exact": the integral with a proven bound, at the cost that `tolerance` takes.  "auto": the
+        cheapest whose bound meets the tolerance.
     tolerance
-        The error in the working space that `met_tolerance` compares the bound with.
+        The error per pixel in the working space, over all four channels; `met_tolerance` compares.
+    certified
+        Whether "auto" needs a proven bound, or an estimate may do.
     step
         Length of a segment in world units; default half the least spacing of the volume.
     threads
-        Threads to march with; default every core this process may use.  The image does not depend on it.
+        Threads to work with; default every core this process may use.  The image does not depend on it.
     progress
         Called with (chunks done, chunks in all).
+    max_seconds
+        Time after which nothing more is begun.  Pixels not reached by then hold the middle of all that they
+        could be, and half of that as their bound; `met_tolerance` tells.
     plan
         A plan from `volref.plan` to follow instead of making one from `method`, `step` and `tolerance`.
 
@@ -58,40 +74,125 @@ def render(
         If an argument breaks a rule of `volref.plan`, or the plan is another scene's.
     """
     started = time.perf_counter()
-    decided = decide(scene, plan, method, step, tolerance)
+    deadline = np.inf if max_seconds is None else started + number("max_seconds", max_seconds, above=0)
+    decided = decide(scene, plan, method, step, tolerance, certified=certified)
     workers = available_cores() if threads is None else whole_number("threads", threads, low=1, high=1024)
     surface = visible_surface(scene) if decided.includes("meshes") else None
-    field = field_of(scene) if decided.includes("volume") else None
-    pixels = scene.width * scene.height
-    rgba, bound = np.empty((pixels, 4)), np.empty(pixels)
-    distance = np.full(pixels, np.inf) if surface is None else surface.distance.reshape(-1)
-    spare: queue.SimpleQueue[Workspace] = queue.SimpleQueue()
-    for _ in range(workers):
-        spare.put(Workspace())
-
-    def march(first: int) -> int:
-        part = np.arange(first, min(first + RAYS_PER_CHUNK, pixels))
-        behind = light_behind(scene, surface, part)
-        work = spare.get()
-        try:
-            chunk = march_chunk(scene, decided, field, part, distance[part], behind, work)
-        finally:
-            spare.put(work)  # a thread that waited for it would wait for ever
-        rgba[part], bound[part] = chunk.rgba, chunk.bound
-        return chunk.samples
-
-    samples = _sum_in_threads(march, range(0, pixels, RAYS_PER_CHUNK), workers, progress)
+    canvas = _Canvas(scene, surface, workers, progress, deadline)
+    if decided.method == "march":
+        kind = "estimate"
+        canvas.draw(_marcher(scene, decided, canvas), _runs(scene))
+    else:
+        kind = "certified"
+        _draw_exactly(scene, decided, canvas)
     shape = scene.height, scene.width
     return Render(
-        rgba.reshape(*shape, 4),
-        distance.reshape(shape),
-        bound.reshape(shape),
-        "estimate",
+        canvas.rgba.reshape(*shape, 4),
+        canvas.distance.reshape(shape),
+        canvas.bound.reshape(shape),
+        kind,
         time.perf_counter() - started,
-        samples,
+        canvas.samples,
         workers,
         decided,
     )
+
+
+class _Canvas:
+    """Pixels being filled in: rgba (H W, 4), bound (H W,), the surface's distance, and the work spent so far."""
+
+    def __init__(
+        self,
+        scene: Scene,
+        surface: Surface | None,
+        workers: int,
+        progress: Progress | None,
+        deadline: float,
+    ) -> None:
+        pixels = scene.width * scene.height
+        self.scene, self.surface, self.workers = scene, surface, workers
+        self.progress, self.deadline = progress, deadline
+        self.distance = np.full(pixels, np.inf) if surface is None else surface.distance.reshape(-1)
+        self.rgba, self.bound = _anything(scene, self.behind(np.arange(pixels)))
+        self.samples = 0
+        self._spare: queue.SimpleQueue[Workspace] = queue.SimpleQueue()
+        for _ in range(workers):
+            self._spare.put(Workspace())
+
+    def behind(self, pixels: Indices) -> Floats:
+        return light_behind(self.scene, self.surface, pixels)
+
+    def draw(self, integrator: Integrator, parts: Sequence[Indices]) -> None:
+        """Fill in `parts` until the deadline; what is not reached stays as it is."""
+
+        def fill(part: Indices) -> int:
+            if time.perf_counter() > self.deadline:
+                return 0
+            work = self._spare.get()
+            try:
+                rgba, bound, samples = integrator(part, work)
+            finally:
+                self._spare.put(work)  # a thread that waited for it would wait for ever
+            self.rgba[part], self.bound[part] = rgba, bound
+            return samples
+
+        self.samples += _sum_in_threads(fill, parts, self.workers, self.progress)
+
+
+def _anything(scene: Scene, behind: Floats) -> tuple[Floats, Floats]:
+    """Return an image (R, 4) midway between all that the volume could show, and its bound (R,)."""
+    if scene.volume is None or scene.transfer is None:
+        return behind.copy(), np.zeros(len(behind))
+    most = np.maximum(behind, np.append(scene.transfer.colors.max(axis=0), 1.0))
+    least = np.append(np.zeros((len(behind), 3)), behind[:, 3:], axis=1)
+    return (most + least) / 2, (most - least).max(axis=1) / 2
+
+
+def _marcher(scene: Scene, plan: Plan, canvas: _Canvas) -> Integrator:
+    field = field_of(scene) if plan.includes("volume") else None
+
+    def march(part: Indices, work: Workspace) -> tuple[Floats, Floats, int]:
+        chunk = march_chunk(scene, plan, field, part, canvas.distance[part], canvas.behind(part), work)
+        return chunk.rgba, chunk.bound, chunk.samples
+
+    return march
+
+
+def _draw_exactly(scene: Scene, plan: Plan, canvas: _Canvas) -> None:
+    """Integrate every pixel to the plan's tolerance; against a deadline, all of them roughly first."""
+    prepared = prepare(scene, plan) if plan.includes("volume") else None
+
+    def to(tolerance: float) -> Integrator:
+        def integrate(part: Indices, _: Workspace) -> tuple[Floats, Floats, int]:
+            done = integrate_pixels(
+                scene, prepared, part, canvas.distance[part], canvas.behind(part), tolerance
+            )
+            return done.rgba, done.bound, done.pieces
+
+        return integrate
+
+    parts = _tiles(scene)
+    if canvas.deadline < np.inf:
+        canvas.draw(to(np.inf), parts)
+        parts = [part for part in parts if canvas.bound[part].max() > plan.tolerance]
+    canvas.draw(to(plan.tolerance), parts)
+
+
+def _runs(scene: Scene) -> list[Indices]:
+    """Return the pixels in runs of RAYS_PER_CHUNK."""
+    pixels = scene.width * scene.height
+    starts = range(0, pixels, RAYS_PER_CHUNK)
+    return [np.arange(first, min(first + RAYS_PER_CHUNK, pixels)) for first in starts]
+
+
+def _tiles(scene: Scene) -> list[Indices]:
+    """Return the pixels in tiles."""
+    number_of = np.arange(scene.width * scene.height).reshape(scene.height, scene.width)
+    return [
+        number_of[y : y + TILE_HEIGHT, x : x + TILE_WIDTH].ravel()
+        for y in range(0, scene.height, TILE_HEIGHT)
+        for x in range(0, scene.width, TILE_WIDTH)
+    ]
 
 
 def decide(
@@ -100,6 +201,8 @@ def decide(
     method: str = "march",
     step: float | None = None,
     tolerance: float = HALF_LEVEL,
+    *,
+    certified: bool = True,
 ) -> Plan:
     """Return the plan to follow: the given one, checked, or one made from the other arguments.
 
@@ -109,11 +212,15 @@ def decide(
         If both are given, or the plan is another scene's.
     """
     if plan is None:
-        return planning.plan(scene, method=method, step=step, tolerance=tolerance)
+        return planning.plan(scene, method=method, step=step, tolerance=tolerance, certified=certified)
     if not isinstance(plan, Plan):
         message = f"plan must be a volref.Plan, got {type(plan).__name__}; make one with volref.plan(scene)"
         raise SceneError(message)
-    if method != plan.method or step is not None or tolerance not in (HALF_LEVEL, plan.tolerance):
+    if (
+        method not in ("auto", plan.method)
+        or step is not None
+        or tolerance not in (HALF_LEVEL, plan.tolerance)
+    ):
         message = (
             f"plan must stand alone, got method {method!r}, step {step} and tolerance {tolerance:g} too; "
         )
@@ -140,7 +247,7 @@ def available_cores() -> int:
 
 
 def _sum_in_threads(
-    work: Callable[[int], int], items: Sequence[int], workers: int, progress: Progress | None
+    work: Callable[[Indices], int], items: Sequence[Indices], workers: int, progress: Progress | None
 ) -> int:
     """Return the sum of `work` over `items`; an exception, Ctrl-C included, drops what has not begun."""
     total = 0

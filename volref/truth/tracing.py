@@ -88,7 +88,7 @@ def trace(
     SceneError
         If the pixel lies outside the image, or an argument breaks a rule of `volref.plan`.
     """
-    decided = decide(scene, plan, step=step)
+    decided = decide(scene, plan, "march", step)
     x, y = _checked_pixel(scene, pixel)
     flat = np.array([y * scene.width + x])
     rays = pixel_rays(scene.camera, scene.width, scene.height, flat)

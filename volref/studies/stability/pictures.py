@@ -5,7 +5,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from volref.arrays import Floats
-from volref.errors import SceneError
 from volref.planning import HALF_LEVEL
 from volref.scene import Scene
 from volref.studies.stability.case import EPS, Answer, Measured
@@ -90,12 +89,7 @@ def _marched(scenes: Sequence[Scene], step: float | None, limit: float | None, s
 
 
 def _exact(scenes: Sequence[Scene], certified: float, slack: float) -> tuple[Answer, ...]:
-    try:
-        pixels, bounds = _rendered(scenes, "exact", tolerance=certified)
-    except SceneError as error:
-        if str(error).startswith("method must be"):  # a version without it
-            return ()
-        raise
+    pixels, bounds = _rendered(scenes, "exact", tolerance=certified)
     certificate = np.repeat(bounds[:, None], 4, axis=1) + slack
     return (Answer("exact", pixels, certified + slack, certificate),)
 
