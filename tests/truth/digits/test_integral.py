@@ -186,6 +186,15 @@ def test_what_lies_behind_shines_through():
     assert_channels(found, [c + clear * b for c, b in zip(alone.rgba, behind, strict=True)])
 
 
+def test_what_shines_through_a_depth_of_40_counts():
+    table = transfer.steps([0.25, 0.5, 1.0], COLORS[:3], [160.0, 1.0, 8.0])
+    found = ray_integral(ramp(), table, *ALONG_X, behind=(1, 1, 1, 1))
+    light, clear = mpf(0), mpf(1)
+    for (red, _, _), depth in zip(COLORS, (40, 0.25, 4), strict=False):
+        light, clear = light - clear * mp.expm1(-depth) * mpf(red), clear * mp.exp(-mpf(depth))
+    assert abs(found.rgba[0] - light - clear) <= DIGITS_30  # of which the last two layers are 1e-18
+
+
 @given(st.integers(1, 15), st.sampled_from(["extinction", "opacity"]))
 def test_a_ray_cut_in_two_is_the_front_over_the_back(sixteenths, kind):
     table = TransferFunction([0.2, 0.45, 0.45, 0.9], COLORS[:4], **{kind: [0, 0.4, 0.1, 0.8]})

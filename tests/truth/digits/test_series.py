@@ -1,3 +1,5 @@
+import dataclasses
+
 import pytest
 from mpmath import mp, mpf
 
@@ -65,6 +67,16 @@ def test_a_step_is_the_integral_within_its_remainder(kind, bends, length, streng
         assert abs(step.depth - depth) <= step.remainder
         assert abs(step.moment - moment) <= step.remainder
         assert step.remainder <= 3 * TOLERANCE * step.depth
+
+
+def test_the_change_of_the_colour_counts_in_the_remainder():
+    # With a brightest colour said to be faint, nothing but the change of the colour is left to ask for terms.
+    within = dataclasses.replace(medium("extinction", (0, 1)), brightest=1e-15)
+    value = [mpf("0.5"), mpf("0.3"), mpf("0.1"), mpf("-0.1")]
+    step = taylor_step(mp, within, value, mpf(1), ZERO)
+    more = taylor_step(mp, dataclasses.replace(within, tolerance=1e-50), value, mpf(1), ZERO)
+    assert step.remainder <= 2e-45
+    assert abs(step.moment - more.moment) <= step.remainder
 
 
 def test_the_series_keep_the_digits_of_the_faintest_media():
