@@ -5,4 +5,6 @@
     pieces      a cell cut where the field turns or meets a knot
     series      optical depth and emission of a piece by Taylor series with a proven remainder
     integral    the conductor
+
+Up to the cubic of a cell numbers are fractions, from there on mpmath's.
 """
