@@ -23,6 +23,13 @@ from volref.records import Pieces, Spans
 # Unit roundoff of float64.
 ROUNDOFF = 2.0**-53
 
+# Roundings of the arithmetic of a cubic, of at most the differences of a cell's samples each: 3 of size 1 in the
+# first differences, 5 each in the second and 35 in the third, and 14 in putting them together.
+ARITHMETIC = 70
+
+# Splits a float64 into two halves of 26 bits.
+SPLITTER = 2.0**27 + 1
+
 # A ray that moves less than this many indices along an axis over its whole length is taken as parallel.
 PARALLEL = 2.0**-60
 
@@ -47,32 +54,77 @@ class CellGrid:
     steepest: float
 
 
-def cells_along(grid: CellGrid, origins: Floats, directions: Floats, spans: Spans) -> Pieces:
+def cells_along(
+    grid: CellGrid, origins: Floats, directions: Floats, spans: Spans, *, precise: bool
+) -> Pieces:
     """Return the pieces of rays (3, R) within `spans` whose cells can be seen.
 
     A piece of world length H about the padded position p has the value f(p + v H d), v from -1/2 to 1/2.
+    `precise` asks for a tight bound on its error, at some cost.
     """
     rays, t_near, t_far = _near_part(grid, origins, directions, spans)
     if len(rays) == 0:
         nothing = np.empty(0)
         return Pieces(rays, nothing, np.empty((4, 0)), nothing, nothing, rays, nothing)
+    error = position_error(grid, origins, directions, spans)[rays]
     origins, directions = origins[:, rays], directions[:, rays]
     ray, length, middle = _between_planes(origins, directions, t_near, t_far)
-    positions, wholes = _positions(origins, directions, ray, middle)
+    direction = [d.take(ray) for d in directions]
+    positions = [d * middle + o.take(ray) for o, d in zip(origins, direction, strict=True)]
+    wholes = [position.astype(np.int32) for position in positions]
     chosen = np.flatnonzero(_lookup(grid.seen, wholes, grid.shift))
     ray, length = ray.take(chosen), length.take(chosen)
-    fractions, base = [], np.zeros(len(chosen), np.intp)
-    for axis, stride in ((0, 1), (1, grid.strides[1]), (2, grid.strides[0])):
+    fractions, strides, base = [], [], np.zeros(len(chosen), np.intp)
+    for axis, step in ((0, 1), (1, grid.strides[1]), (2, grid.strides[0])):
         whole = wholes[axis].take(chosen)
         fractions.append(positions[axis].take(chosen) - whole)
-        base += whole if stride == 1 else np.multiply(whole, stride, dtype=np.intp)
-    strides = [d.take(ray) * length for d in directions]
-    cubic, spread = _cubic(grid.corners, base, fractions, strides)
-    slack, astray = _slack(
-        position_error(grid, origins, directions, t_far), directions, ray, length, cubic, spread
-    )
+        strides.append(direction[axis].take(chosen) * length)
+        base += whole if step == 1 else np.multiply(whole, step, dtype=np.intp)
+    cubic, moved, size = _cubic(grid.corners, base, fractions, strides, precise=precise)
+    slack = error.take(ray) * moved + (ARITHMETIC * ROUNDOFF) * size
+    slack += np.where(size > 0, ROUNDOFF * np.abs(cubic[0]), 0.0)
+    slowest = np.where(directions == 0, np.inf, np.abs(directions)).min(axis=0)
+    astray = np.minimum((2 * error / slowest).take(ray) / length, 1.0)
     n = len(ray)
     return Pieces(rays.take(ray), length, cubic, slack, astray, np.full(n, -1, np.intp), np.zeros(n))
+
+
+def position_error(grid: CellGrid, origins: Floats, directions: Floats, spans: Spans) -> Floats:
+    """Return how far positions along rays (3, R) may be off along each axis, in indices (R,).
+
+    With u the unit roundoff: o is rounded (u |o|), t d is (u t |d|) and so is the sum, which is at most the
+    grid's size n (u n), and neighbouring pieces meet to u t: u (2 t |d| + |o| + n + 4).  Within twice this
+    from the end of a piece along each axis the ray may be in the next cell: it is astray.
+    """
+    furthest = np.maximum(np.abs(spans.t_near), np.abs(spans.t_far))
+    reach = np.abs(origins) + 2 * furthest * np.abs(directions)
+    size = max(grid.seen.shape) << grid.shift
+    return ROUNDOFF * (reach.max(axis=0) + size + 4)
+
+
+def recentred(origins: Floats, directions: Floats, spans: Spans) -> tuple[Floats, Spans]:
+    """Return the origins (3, R) moved to the middle of each span, and the spans from there.
+
+    A ray that starts far away loses digits in o + t d at each of its pieces; moved once, with the sum and the
+    product kept to twice the digits (Dekker 1971), it loses half an ulp of the new origin.
+    """
+    middle = 0.5 * (spans.t_near + spans.t_far)
+    middle = np.where(np.isfinite(middle) & (spans.t_far > spans.t_near), middle, 0.0)
+    product = directions * middle
+    rest = _product_error(directions, middle, product)
+    moved = origins + product
+    virtual = moved - origins
+    rest += (origins - (moved - virtual)) + (product - virtual)
+    return moved + rest, Spans(spans.t_near - middle, spans.t_far - middle)
+
+
+def _product_error(a: Floats, b: Floats, product: Floats) -> Floats:
+    """Return a b - product exactly, for the rounded product, by splitting each into halves of 26 bits."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        a_high, b_high = (x * SPLITTER - (x * SPLITTER - x) for x in (a, b))
+        a_low, b_low = a - a_high, b - b_high
+        rest = ((a_high * b_high - product) + a_high * b_low + a_low * b_high) + a_low * b_low
+    return np.where(np.isfinite(rest), rest, 0.0)
 
 
 def _near_part(
@@ -114,9 +166,10 @@ def _between_planes(
 ) -> tuple[Indices, Floats, Floats]:
     """Return ray, world length and middle t of the parts of rays between grid planes, in order."""
     parts = [t_near[:, None], t_far[:, None]]
+    furthest = np.maximum(np.abs(t_near), np.abs(t_far))
     for o, d in zip(origins, directions, strict=True):
         with np.errstate(divide="ignore"):
-            inverse = np.where(np.abs(d) * t_far < PARALLEL, 0.0, 1.0 / d)
+            inverse = np.where(np.abs(d) * furthest < PARALLEL, 0.0, 1.0 / d)
         ends = o + t_near * d, o + t_far * d
         first = np.ceil(np.minimum(*ends))
         most = int((np.floor(np.maximum(*ends)) - first).max()) + 1
@@ -129,18 +182,12 @@ def _between_planes(
     np.minimum(edges, t_far[:, None], out=edges)
     edges.sort(axis=1)
     length = np.diff(edges, axis=1)
-    ray, piece = np.nonzero(length > 0)
-    flat = ray * edges.shape[1] + piece
-    length = length[ray, piece]
+    flat = np.flatnonzero(length > 0)
+    counts = np.count_nonzero(length > 0, axis=1)
+    ray = np.repeat(np.arange(len(counts)), counts)
+    length = length.reshape(-1).take(flat)
+    flat += ray  # edges have one column more
     return ray, length, edges.reshape(-1).take(flat) + 0.5 * length
-
-
-def _positions(
-    origins: Floats, directions: Floats, ray: Indices, t: Floats
-) -> tuple[list[Floats], list[Numbers]]:
-    """Return per axis the padded positions at t and their whole parts."""
-    positions = [d.take(ray) * t + o.take(ray) for o, d in zip(origins, directions, strict=True)]
-    return positions, [position.astype(np.int32) for position in positions]
 
 
 def _lookup(flags: Booleans, wholes: list[Numbers], shift: int) -> Booleans:
@@ -152,12 +199,12 @@ def _lookup(flags: Booleans, wholes: list[Numbers], shift: int) -> Booleans:
 
 
 def _cubic(
-    corners: tuple[Numbers, ...], base: Indices, fraction: list[Floats], stride: list[Floats]
-) -> tuple[Floats, Floats]:
-    """Return the cubic (4, n) of f(fraction + v stride) in the cell at `base`, and the cell's spread (n,).
+    corners: tuple[Numbers, ...], base: Indices, fraction: list[Floats], stride: list[Floats], *, precise: bool
+) -> tuple[Floats, Floats, Floats]:
+    """Return the cubic (4, n) of f(fraction + v stride) in the cell at `base`, and two sizes (n,).
 
-    f = k0 + kx x + ky y + kz z + kxy x y + kxz x z + kyz y z + kxyz x y z; the spread, the sum of the
-    magnitudes of all but k0, bounds each partial derivative and the rounding of f - k0.
+    f = k0 + kx x + ky y + kz z + kxy x y + kxz x z + kyz y z + kxyz x y z.  The first size bounds the sum of the
+    partial derivatives on the piece, the second the differences of the cell's samples.
     """
     # corner (dz, dy, dx) is number 4 dz + 2 dy + dx
     at = [corner.take(base).astype(np.float64, copy=False) for corner in corners]
@@ -174,35 +221,18 @@ def _cubic(
     slope_z = kz + kxz * x + cross_x * y
     cubic[0] = k0 + (kx * x + (ky + kxy * x) * y + slope_z * z)
     cubic[1] = slope_x * dx + slope_y * dy + slope_z * dz
-    cubic[2] = cross_z * dx * dy + cross_y * dx * dz + cross_x * dy * dz
+    turn_x, turn_y, turn_z = cross_z * dy + cross_y * dz, cross_z * dx + cross_x * dz, cross_y * dx + cross_x * dy
+    cubic[2] = 0.5 * (turn_x * dx + turn_y * dy + turn_z * dz)
     cubic[3] = kxyz * dx * dy * dz
-    spread = np.abs(kx)
-    for k in (ky, kz, kxy, kxz, kyz, kxyz):
-        spread += np.abs(k)
-    return cubic, spread
-
-
-def position_error(grid: CellGrid, origins: Floats, directions: Floats, t_far: Floats) -> Floats:
-    """Return how far positions along rays (3, R) may be off along each axis, in indices (R,).
-
-    With u the unit roundoff: o was shifted by the padding (u |o|), t d is rounded (u t |d|) and so is the sum,
-    which is at most the grid's size n (u n), and neighbouring pieces meet to u t: u (2 t |d| + |o| + n + 4).
-    """
-    reach = np.abs(origins) + 2 * t_far * np.abs(directions)
-    size = max(grid.seen.shape) << grid.shift
-    return ROUNDOFF * (reach.max(axis=0) + size + 4)
-
-
-def _slack(
-    error: Floats, directions: Floats, ray: Indices, length: Floats, cubic: Floats, spread: Floats
-) -> tuple[Floats, Floats]:
-    """Return how far the field may be from the cubic, and the share of the piece that may be astray, (n,) each.
-
-    A position that is off by `error` (R,) moves the value by that times `spread`; within `error` / |d| of the ends
-    the ray may already be in the next cell; the arithmetic of the cubic costs 64 u `spread`, and the sum with k0
-    one rounding of the result, none in a constant cell.
-    """
-    moving = np.where(directions == 0, np.inf, np.abs(directions)).min(axis=0)
-    astray = np.minimum(2 * (error / moving).take(ray) / length, 1.0)
-    arithmetic = np.where(spread > 0, ROUNDOFF * np.abs(cubic[0]), 0.0)
-    return (error.take(ray) + 64 * ROUNDOFF) * spread + arithmetic, astray
+    if not precise:
+        spread = np.abs(kx)
+        for k in (ky, kz, kxy, kxz, kyz, kxyz):
+            spread += np.abs(k)
+        return cubic, spread, spread
+    moved = np.abs(slope_x) + np.abs(slope_y) + np.abs(slope_z)
+    moved += 0.5 * (np.abs(turn_x) + np.abs(turn_y) + np.abs(turn_z))
+    moved += 0.25 * np.abs(kxyz) * (np.abs(dx * dy) + np.abs(dx * dz) + np.abs(dy * dz))
+    low, high = at[0], at[0]
+    for corner in at[1:]:
+        low, high = np.minimum(low, corner), np.maximum(high, corner)
+    return cubic, moved, high - low

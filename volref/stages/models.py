@@ -37,10 +37,16 @@ COLUMNS = 22
 # A run has at most this many pieces, fewer in long tables so that there are at most about MOST_ROWS rows.
 LONGEST, SHORTEST, MOST_ROWS = 48, 8, 1 << 16
 
+# Pieces are cut to at most this part of the volume's values, so that a run near a bend can be short.
+FINEST = 128
+
 # A piece of interpolated opacity is cut until its extinction is straight to this part of itself,
 # or to this optical depth per unit distance; above the last opacity it is left as it is.
 # It is cut into at most MOST_PARTS parts over all pieces, or two each.
 STRAIGHT, STRAIGHT_DEPTH, MOST_OPACITY, MOST_PARTS = 1e-4, 1e-7, 1 - 1e-4, 2048
+
+# The relative error of values that are sampled where a ray enters or leaves.
+NEARBY = 1e-12
 
 # The largest float below 1.
 MOST_OPACITY_BELOW_1 = 1 - 2.0**-53
@@ -77,7 +83,8 @@ class Models:
     """Rows (COLUMNS, rows) of models, and how to find them.
 
     bends (m + 1,): the values between which the exact rows hold.  blur: how close knots were taken for one.
-    most_sigma, most_jump, most_slope: the greatest finite extinction, jump and slope of it.  unit_distance is None where the extinction is interpolated.  largest (3,): the greatest colour.
+    most_sigma, most_jump, most_slope: the greatest finite extinction, jump and slope of it.  bent: whether any row's colour is.
+    unit_distance is None where the extinction is interpolated.  largest (3,): the greatest colour.
     """
 
     rows: Floats
@@ -90,6 +97,7 @@ class Models:
     most_sigma: float
     most_jump: float
     most_slope: float
+    bent: bool
     unit_distance: float | None
     largest: Floats
 
@@ -99,7 +107,8 @@ def models_of(transfer: TransferFunction, low: float, high: float) -> Models:
     unit_distance = transfer.unit_distance if transfer.extinction is None else None
     table = table_pieces(transfer, low, high)
     straight, off = without_straight_breaks(table)
-    fine = table if unit_distance is None else _refined(table)
+    fine = _divided(table, (high - low) / FINEST)
+    fine = fine if unit_distance is None else _refined(fine)
     fine, sag = _in_extinction(fine, unit_distance)
     blocks, levels, count = [], [], 0
     for shift, groups, longest, block in _levels(fine, sag):
@@ -121,6 +130,7 @@ def models_of(transfer: TransferFunction, low: float, high: float) -> Models:
         float(max(fine.left[STRENGTH].max(), fine.right[STRENGTH].max())),
         float(rows[JUMP].max()),
         float(rows[BESIDE].max()) if not rows[TOUCHING].any() else np.inf,
+        bool(rows[C2].any()),
         unit_distance,
         np.maximum(table.left[:3].max(axis=1), table.right[:3].max(axis=1)),
     )
@@ -168,6 +178,36 @@ def rows_of(models: Models, low: Floats, high: Floats) -> Indices:
     return row
 
 
+def most_extinction(models: Models, values: Floats) -> Floats:
+    """Return a finite bound on the extinction of values (m,) that are off by rounding."""
+    slack = NEARBY * np.abs(values)
+    row = rows_of(models, values - slack, values + slack)
+    rows = models.rows
+    offset = np.abs(values - rows[CENTER].take(row)) + slack
+    most = rows[SIGMA0].take(row) + np.abs(rows[SIGMA1].take(row)) * offset + rows[SIGMA_OFF].take(row)
+    return np.minimum(most, models.most_sigma)
+
+
+def _divided(table: TablePieces, width: float) -> TablePieces:
+    """Cut pieces wider than `width` into equal parts, up to FINEST of each."""
+    if not width > 0:
+        return table
+    parts = np.clip(np.ceil(np.diff(table.breaks) / width), 1, FINEST).astype(np.intp)
+    piece = np.repeat(np.arange(len(parts)), parts)
+    number = np.arange(len(piece)) - np.repeat(np.cumsum(parts) - parts, parts)
+    return _cut(table, piece, number / parts[piece], (number + 1) / parts[piece])
+
+
+def _cut(table: TablePieces, piece: Indices, start: Floats, end: Floats) -> TablePieces:
+    """Return the parts of pieces from the share `start` to `end` of each."""
+    breaks = table.breaks[:-1][piece] + np.diff(table.breaks)[piece] * start
+    rise = (table.right - table.left)[:, piece]
+    left, right = table.left[:, piece] + rise * start, table.left[:, piece] + rise * end
+    whole = end == 1.0
+    right[:, whole] = table.right[:, piece[whole]]
+    return dataclasses.replace(table, breaks=np.append(breaks, table.breaks[-1]), left=left, right=right)
+
+
 def _refined(table: TablePieces) -> TablePieces:
     """Cut pieces of interpolated opacity until the extinction on each is nearly straight."""
     clear = np.clip(1.0 - np.stack([table.left[STRENGTH], table.right[STRENGTH]]), 1 - MOST_OPACITY, 1.0)
@@ -189,13 +229,7 @@ def _refined(table: TablePieces) -> TablePieces:
         )
         share = np.where(k == 0, 0.0, np.where(k == parts[piece], 1.0, np.clip(share, 0.0, 1.0)))
         ends.append(share)
-    width = np.diff(table.breaks)[piece]
-    breaks = table.breaks[:-1][piece] + width * ends[0]
-    span = (table.right - table.left)[:, piece]
-    left, right = table.left[:, piece] + span * ends[0], table.left[:, piece] + span * ends[1]
-    last = np.cumsum(parts) - 1
-    right[:, last] = table.right
-    return TablePieces(np.append(breaks, table.breaks[-1]), left, right)
+    return _cut(table, piece, *ends)
 
 
 def _in_extinction(table: TablePieces, unit_distance: float | None) -> tuple[TablePieces, Floats]:

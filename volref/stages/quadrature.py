@@ -27,27 +27,31 @@ import numpy as np
 
 from volref.arrays import Floats, Indices
 
-# Ellipses in which integrands are bounded, and orders to choose from.
-RHOS = (2.5, 5.0, 12.0, 40.0)
-ORDERS = (2, 3, 4, 5, 6, 8, 11, 15, 20)
+# Ellipses in which integrands are bounded: one that serves most pieces, and others for what is left.
+RHO = 6.0
+RHOS = (2.5, 12.0, 40.0)
+
+# Odd orders only: g is 0 at their middle node, which then costs nothing.
+ORDERS = (3, 5, 7, 9, 13, 21)
 
 # Beyond this exponent a bound is useless: the piece must be cut first.
 MOST_EXPONENT, MOST_DENSITY = 300.0, 1e100
 
 
 @dataclass(frozen=True, eq=False)
-class Emission:
-    """Of n pieces: optical depth and opacity, the moments J1 and J2 with the error of J1, all (n,).
+class Moments:
+    """Of n pieces: the moments J1 and J2 and the error of J1, (n,) each; J2 is 0 where it was not asked for.
 
-    The error of J2 is that of J1 times `reach`, a bound of |g| where the integrand was bounded.
+    The error of J2 is that of J1 times the greatest |g| in the ellipse, at most `REACH` times that on the piece.
     """
 
-    depth: Floats
-    opacity: Floats
     first: Floats
     second: Floats
     error: Floats
-    reach: Floats
+
+
+# (rho + 1/rho) / 2 for the widest ellipse, to the third power: how much further a cubic may reach there.
+REACH = ((RHOS[-1] + 1 / RHOS[-1]) / 2) ** 3
 
 
 @cache
@@ -64,75 +68,102 @@ def gauss_pairs(order: int) -> tuple[float, tuple[tuple[float, float], ...]]:
     return float(weights[order // 2]) / 2 if order % 2 else 0.0, pairs
 
 
-def emission(cubic: Floats, density: Floats, weight: Floats, share: Floats, *, second: bool) -> Emission:
-    """Return depth, opacity and moments of pieces with cubics and densities A (4, n).
+def moments(cubic: Floats, density: Floats, limit: Floats, *, second: bool) -> Moments:
+    """Return the moments of pieces with cubics and densities A (4, n); `second` asks for J2.
 
-    The order of each piece is the least whose error of J1 times `weight` (n,) stays below `share` (n,).
-    Where none does, the moments are 0 and their error what they may be at most.  `second` asks for J2.
+    The order of each piece is the least whose error of J1 stays below `limit` (n,).  Where none does, the moments
+    are those of the highest, if its error is less than what they can be at all, and else 0.
     """
-    depth = np.maximum(density[0] + density[2] / 12, 0.0)
-    opacity = -np.expm1(-depth)
-    order, error = _orders(cubic, density, weight, share)
-    n = len(depth)
-    first, square = np.zeros(n), np.zeros(n)
-    for k in ORDERS:
-        chosen = np.flatnonzero(order == k)
-        if len(chosen) == 0:
-            continue
-        if len(chosen) == n:
+    order, error = _orders(cubic, density, limit)
+    first, square = np.zeros_like(limit), np.zeros_like(limit)
+    for index, k in enumerate(ORDERS):
+        chosen = np.flatnonzero(order == index)
+        if len(chosen) == len(limit):
             first, square = _moments(cubic, density, k, second=second)
-        else:
-            first[chosen], square[chosen] = _moments(
-                cubic.take(chosen, axis=1), density.take(chosen, axis=1), k, second=second
-            )
-    reach = 0.5 * np.abs(cubic[1]) + 0.25 * np.abs(cubic[2]) + 0.125 * np.abs(cubic[3])
-    return Emission(depth, opacity, first, square, np.minimum(error, 2 * reach * opacity), 12 * reach)
+        elif len(chosen):
+            parts = cubic.take(chosen, axis=1), density.take(chosen, axis=1)
+            first[chosen], square[chosen] = _moments(*parts, k, second=second)
+    return Moments(first, square, error)
 
 
-def _orders(cubic: Floats, density: Floats, weight: Floats, share: Floats) -> tuple[Indices, Floats]:
-    """Return the order of each piece, 0 where none serves, and the error of J1 (n,)."""
-    f1, f2, f3 = np.abs(cubic[1:])
-    a0, (a1, a2, a3) = np.abs(density[0]), np.abs(density[1:])
-    bounds = []
-    for rho in RHOS:
-        r = (rho + 1 / rho) / 4
-        value = ((f3 * r + f2) * r + f1) * r
-        change = ((a3 * r + a2) * r + a1) * r
-        exponent = np.minimum(a0 * (r - 0.5) + change * ((r + 0.5) / 2), MOST_EXPONENT)
-        size = np.minimum(a0 + change, MOST_DENSITY)
-        with np.errstate(over="ignore"):  # infinite: of no use, and never chosen
-            bounds.append(value * size * np.exp(exponent) * (32 / 15 / (1 - rho**-2)))
-    n = len(weight)
-    order, error = np.zeros(n, np.intp), np.full(n, np.inf)
-    open_ = np.arange(n)
-    for k in ORDERS:
-        least = bounds[0][open_] * RHOS[0] ** (-2 * k)
-        for rho, bound in zip(RHOS[1:], bounds[1:], strict=True):
-            np.minimum(least, bound[open_] * rho ** (-2 * k), out=least)
-        good = least <= share[open_] / np.maximum(weight[open_], 1e-300)
-        order[open_[good]], error[open_[good]] = k, least[good]
-        open_ = open_[~good]
-        if len(open_) == 0:
-            break
-    return order, error
+def _remainder(cubic: Floats, density: Floats, rho: float) -> Floats:
+    """Return the remainder of J1 times rho^2k (n,), infinite where it is of no use."""
+    r = (rho + 1 / rho) / 4
+    value = np.abs(cubic[3]) * r
+    value += np.abs(cubic[2])
+    value *= r
+    value += np.abs(cubic[1])
+    value *= r
+    change = np.abs(density[3]) * r
+    change += np.abs(density[2])
+    change *= r
+    change += np.abs(density[1])
+    change *= r
+    exponent = density[0] * (r - 0.5)
+    exponent += change * ((r + 0.5) / 2)
+    np.minimum(exponent, MOST_EXPONENT, out=exponent)
+    np.exp(exponent, out=exponent)
+    change += density[0]
+    np.minimum(change, MOST_DENSITY, out=change)
+    change *= 32 / 15 / (1 - rho**-2)
+    with np.errstate(over="ignore"):
+        value *= change
+        value *= exponent
+    return value
+
+
+def _orders(cubic: Floats, density: Floats, limit: Floats) -> tuple[Indices, Floats]:
+    """Return the index of each piece's order, len(ORDERS) where none serves, and the error of J1 (n,)."""
+    error = _remainder(cubic, density, RHO)
+    index = np.zeros(len(limit), np.int8)
+    scaled = RHO ** (2 * ORDERS[0]) * np.minimum(limit, MOST_DENSITY)
+    for lower, upper in zip(ORDERS[:3], ORDERS[1:4], strict=True):
+        index += error > scaled
+        scaled *= RHO ** (2 * (upper - lower))
+    error *= (RHO ** (-2.0 * np.array(ORDERS[:4])))[index]
+    left = np.flatnonzero(index >= 2)
+    if len(left):
+        index[left], error[left] = _searched(cubic.take(left, axis=1), density.take(left, axis=1), limit.take(left))
+    return index, error
+
+
+def _searched(cubic: Floats, density: Floats, limit: Floats) -> tuple[Indices, Floats]:
+    """Return the same, by the best of all ellipses."""
+    bounds = [(rho, _remainder(cubic, density, rho)) for rho in (RHO, *RHOS)]
+    index, error = np.full(len(limit), len(ORDERS), np.int8), np.full(len(limit), np.inf)
+    for number, k in reversed(list(enumerate(ORDERS))):
+        least = np.minimum.reduce([bound * rho ** (-2 * k) for rho, bound in bounds])
+        good = least <= limit
+        index[good], error[good] = number, least[good]
+        if number == len(ORDERS) - 1:
+            depth = np.maximum(density[0] + density[2] / 12, 0.0)
+            reach = 0.5 * np.abs(cubic[1]) + 0.25 * np.abs(cubic[2]) + 0.125 * np.abs(cubic[3])
+            most = reach * -np.expm1(-depth)
+            useful = ~good & (least < most)
+            index[useful], error[useful] = number, least[useful]
+            none = ~good & ~useful
+            error[none] = most[none]
+    return index, error
 
 
 def _moments(cubic: Floats, density: Floats, order: int, *, second: bool) -> tuple[Floats, Floats]:
     """Return J1 and J2 by the Gauss rule; nodes come in pairs +x, -x, whose even and odd parts are shared."""
     _, f1, f2, f3 = cubic
     a0, a1, a2, a3 = density
-    near = -a0 / 2 + a1 / 8 - a2 / 24 + a3 / 64  # the depth quartic at v = -1/2
+    near = a0 / 2 - a1 / 8 + a2 / 24 - a3 / 64  # minus the depth quartic at v = -1/2
     first, square = np.zeros_like(f1), np.zeros_like(f1)
     for x, weight in gauss_pairs(order)[1]:
         xx = x * x
         g_even, g_odd = f2 * xx, (f3 * xx + f1) * x
-        a_even, a_odd = a2 * xx + a0, (a3 * xx + a1) * x
-        t_even, t_odd = (a3 * (xx / 4) + a1 / 2) * xx - near, (a2 * (xx / 3) + a0) * x
-        for sign in (1, -1):
-            g = g_even + sign * g_odd
-            light = g * (a_even + sign * a_odd)
-            light *= np.exp(-(t_even + sign * t_odd))
-            light *= weight
+        a_even, a_odd = a2 * (xx * weight) + a0 * weight, (a3 * xx + a1) * (x * weight)
+        t_even, t_odd = (a3 * (xx / 4) + a1 / 2) * xx + near, (a2 * (xx / 3) + a0) * x
+        for combine in (np.add, np.subtract):
+            light = combine(t_even, t_odd)
+            np.negative(light, out=light)
+            np.exp(light, out=light)
+            light *= combine(a_even, a_odd)
+            g = combine(g_even, g_odd)
+            light *= g
             first += light
             if second:
                 light *= g

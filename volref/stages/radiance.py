@@ -20,7 +20,7 @@ from volref.arrays import Floats, Indices
 ROUNDOFF = 2.0**-53
 
 # Roundings per ray besides two per piece: see docs/certificate.md.
-ROUNDINGS = 200
+ROUNDINGS = 80
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,26 +52,39 @@ def layout_of(ray: Indices) -> Layout:
     return Layout(ray.take(first), first, last, np.cumsum(begins) - 1)
 
 
+def running_sums(values: Floats, layout: Layout) -> tuple[Floats, Floats, Floats]:
+    """Return running sums (n,), and for each ray what they begin from and the ray's own sum (k,).
+
+    The sum over a ray up to and with a piece is the running sum there less what the ray begins from.  There is one
+    cumulative sum for all rays: each ray takes the sum of the ray before it off again, so that rounding is of the
+    size of the ray's own sums, and what is left of it is what the ray begins from.
+
+    Examples
+    --------
+    >>> sums, begin, total = running_sums(np.array([1.0, 2.0, 4.0, 8.0]), layout_of(np.array([0, 0, 0, 1])))
+    >>> sums.tolist(), begin.tolist(), total.tolist()
+    ([1.0, 3.0, 7.0, 8.0], [0.0, 0.0], [7.0, 8.0])
+    """
+    totals = np.add.reduceat(values, layout.first)
+    shifted = values.copy()
+    shifted[layout.first[1:]] -= totals[:-1]
+    sums = np.cumsum(shifted, out=shifted)
+    return sums, sums.take(layout.first) - values.take(layout.first), totals
+
+
 def sums_in_front(values: Floats, layout: Layout) -> Floats:
     """Return for each piece the sum of `values` (n,) of the pieces in front of it on its ray.
-
-    One cumulative sum for all rays: each ray takes the sum of the ray before it off again, so that rounding is
-    of the size of the ray's own sums, and what is left of it is taken off the whole ray.
 
     Examples
     --------
     >>> sums_in_front(np.array([1.0, 2.0, 4.0, 8.0]), layout_of(np.array([0, 0, 0, 1]))).tolist()
     [0.0, 1.0, 3.0, 0.0]
     """
-    totals = np.add.reduceat(values, layout.first)
-    shifted = values.copy()
-    shifted[layout.first[1:]] -= totals[:-1]
-    before = np.cumsum(shifted)
-    before -= values
-    start = before.take(layout.first)
-    before -= start.take(layout.member)
-    before[layout.first] = 0.0
-    return before
+    sums, begin, _ = running_sums(values, layout)
+    sums -= values
+    sums -= begin.take(layout.member)
+    sums[layout.first] = 0.0
+    return sums
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,15 +143,25 @@ def gathered(pieces: Modelled, layout: Layout, behind: Floats, brightest: float)
     for channel in range(3):
         weighted = pieces.in_front * pieces.light[channel]
         lost = pieces.in_front * pieces.light_error[channel]
-        before = sums_in_front(weighted, layout)
-        total = np.add.reduceat(weighted, layout.first) + transmittance * behind[:, channel]
-        uncertain = np.add.reduceat(lost, layout.first) + rounding
-        arriving = (total.take(member) - before - weighted) * beyond
-        contrast = np.abs(pieces.color[channel] - arriving) + 2 * pieces.color_change[channel]
-        with np.errstate(over="ignore"):  # then nothing is known of it
-            contrast += uncertain.take(member) * beyond
-        np.minimum(contrast, brightest, out=contrast)
-        np.maximum(share, in_front * (unsure * contrast + covered) + lost, out=share)
+        sums, begin, total = running_sums(weighted, layout)
+        total += transmittance * behind[:, channel]
         rgba[:, channel] = total
+        total += begin
+        arriving = total.take(member)
+        arriving -= sums
+        arriving *= beyond
+        contrast = np.abs(np.subtract(pieces.color[channel], arriving, out=arriving), out=arriving)
+        contrast += pieces.color_change[channel]
+        contrast += pieces.color_change[channel]
+        uncertain = (np.add.reduceat(lost, layout.first) + rounding).take(member)
+        with np.errstate(over="ignore"):  # then nothing is known of it
+            uncertain *= beyond
+        contrast += uncertain
+        np.minimum(contrast, brightest, out=contrast)
+        contrast *= unsure
+        contrast += covered
+        contrast *= in_front
+        contrast += lost
+        np.maximum(share, contrast, out=share)
     rgba[:, 3] = 1.0 - transmittance * (1.0 - behind[:, 3])
     return Gathered(rgba, np.add.reduceat(share, layout.first) + rounding, share)

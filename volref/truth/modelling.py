@@ -10,9 +10,9 @@ import numpy as np
 from volref.arrays import Booleans, Floats, Indices
 from volref.records import Pieces
 from volref.stages import models as column
-from volref.stages.curved import LOGARITHM_LOSS, curved_emission
+from volref.stages.curved import LOGARITHM_LOSS, CurvedEmission, curved_emission
 from volref.stages.models import Models, rows_of
-from volref.stages.quadrature import emission
+from volref.stages.quadrature import REACH, moments
 from volref.stages.radiance import Layout, Modelled, layout_of, sums_in_front
 from volref.stages.splitting import value_range
 
@@ -47,62 +47,111 @@ def modelled(models: Models, pieces: Pieces, astray: float, tolerance: float) ->
 
     `astray` is how far the value of a neighbouring cell may be where a piece is astray.
     """
-    # There, what is seen may differ by a jump, or by as much as the value.
-    astray_sigma = min(models.most_sigma, models.most_jump + models.most_slope * astray) if astray else 0.0
     row = _rows(models, pieces)
-    rows = models.rows
-    seen = np.flatnonzero(rows[column.SEEN].take(row) > 0)
+    seen = np.flatnonzero(models.rows[column.SEEN].take(row))
     if len(seen) < len(row):
         pieces, row = pieces.take(seen), row.take(seen)
     layout = layout_of(pieces.ray)
-    length, cubic = pieces.length, pieces.cubic
-    offset = cubic[0] - rows[column.CENTER].take(row)
-    slope, level = rows[column.SIGMA1].take(row), rows[column.SIGMA0].take(row)
-    density = np.empty_like(cubic)
-    density[0] = level + slope * offset
-    np.multiply(cubic[1:], slope, out=density[1:])
-    density *= length
-    reach = 0.5 * np.abs(cubic[1]) + 0.25 * np.abs(cubic[2]) + 0.125 * np.abs(cubic[3])
-    slope = np.abs(slope)
-    depth_error = rows[column.SIGMA_OFF].take(row) + slope * (pieces.slack + 128 * ROUNDOFF * reach)
-    depth_error += (32 * ROUNDOFF) * level + pieces.astray * astray_sigma
-    depth_error *= length
-    c1, c2 = rows[column.C1].take(row, axis=1), rows[column.C2].take(row, axis=1)
-    color = rows[column.C0].take(row, axis=1) + offset * (c1 + offset * c2)
-    c1 += 2 * offset * c2
-    c1_size, c2_size = np.abs(c1), np.abs(c2)
-    change = (c1_size + c2_size * reach) * reach
-    steepest_color = (c1_size + 2 * c2_size * reach).max(axis=0)
-    color_error = rows[column.COLOR_OFF].take(row) + steepest_color * pieces.slack
-    misplaced = length * pieces.astray * (astray_sigma * float(models.largest.max()))
-    _beside(models, pieces, row, depth_error, color_error, misplaced)
-    share = np.full(len(row), tolerance * QUADRATURE_SHARE)
-    depth = np.maximum(density[0] + density[2] / 12, 0.0)
-    steepest = np.abs(density[0]) + 0.5 * np.abs(density[1]) + 0.25 * np.abs(density[2])
-    steepest += 0.125 * np.abs(density[3])
+    # There, what is seen may differ by a jump, or by as much as the value.
+    astray_sigma = min(models.most_sigma, models.most_jump + models.most_slope * astray) if astray else 0.0
+    offset, reach, density, depth_error, light_error = _extinction(models, pieces, row, astray_sigma)
+    color, slopes, bend, change = _color(models, row, offset, reach)
+    steepest_color = change.max(axis=0)
+    steepest_color /= np.maximum(reach, 1e-300)
+    color_error = steepest_color * pieces.slack
+    color_error += models.rows[column.COLOR_OFF].take(row)
+    _beside(models, pieces, row, depth_error, color_error, light_error)
+    depth = density[2] / 12
+    depth += density[0]
+    np.maximum(depth, 0.0, out=depth)
+    steepest = np.abs(density[1:]).T @ np.array([0.5, 0.25, 0.125]) + density[0]
+    unsettled = np.zeros(len(row), np.bool_)
+    share = tolerance * QUADRATURE_SHARE
     curved = _curved(models, pieces, row, offset, steepest_color, share)
     if curved is not None:
         at, light = curved
         depth[at] = light.depth
-    in_front = np.exp(-sums_in_front(np.minimum(depth, OPAQUE), layout))
-    weight = in_front * change.max(axis=0) / np.maximum(reach, 1e-300)
-    straight = emission(cubic, density, weight, share, second=bool(c2.any()))
-    first, error, opacity = straight.first, straight.error, straight.opacity
-    unsettled = np.zeros(len(row), np.bool_)
-    if curved is not None:
-        opacity[at] = -np.expm1(-light.depth)
-        first[at], error[at] = light.first, light.error
         depth_error[at] += light.depth_error
         unsettled[at] = ~light.settled
         steepest[at] = np.where(light.settled & (light.depth >= OPAQUE), 0.0, light.depth)
-    light_error = error * (c1_size + c2_size * straight.reach)
-    shine = color * opacity + c1 * first + c2 * straight.second
-    quadrature = in_front * light_error.max(axis=0)
-    light_error += misplaced
-    integrals = Modelled(
-        depth, opacity, in_front, shine, color, change, depth_error, color_error, light_error
-    )
+    in_front = np.exp(-sums_in_front(np.minimum(depth, OPAQUE), layout))
+    opacity = -np.expm1(-depth)
+    steepest_color *= in_front
+    np.maximum(steepest_color, 1e-300, out=steepest_color)
+    straight = moments(cubic=pieces.cubic, density=density, limit=share / steepest_color, second=bend is not None)
+    if curved is not None:
+        straight.first[at], straight.error[at] = light.first, light.error
+    shine, error = color * opacity, np.abs(slopes)
+    slopes *= straight.first
+    shine += slopes
+    if bend is not None:
+        shine += bend * straight.second
+        error += np.abs(bend) * (REACH * reach)
+    error *= straight.error
+    quadrature = error.max(axis=0)
+    quadrature *= in_front
+    error += light_error
+    integrals = Modelled(depth, opacity, in_front, shine, color, change, depth_error, color_error, error)
     return Solved(pieces, layout, integrals, row, quadrature, np.maximum(steepest, 1e-300), unsettled)
+
+
+def _extinction(
+    models: Models, pieces: Pieces, row: Indices, astray_sigma: float
+) -> tuple[Floats, Floats, Floats, Floats, Floats]:
+    """Return offset, reach, density (4, n), P, and the light that astray parts may add, (n,) each.
+
+    The offset is the middle value less the row's centre, the reach how far the value leaves the middle one.
+    """
+    rows, length, cubic = models.rows, pieces.length, pieces.cubic
+    offset = cubic[0] - rows[column.CENTER].take(row)
+    slope, level = rows[column.SIGMA1].take(row), rows[column.SIGMA0].take(row)
+    density = np.empty_like(cubic)
+    np.multiply(cubic[1:], slope, out=density[1:])
+    np.multiply(slope, offset, out=density[0])
+    density[0] += level
+    np.maximum(density[0], 0.0, out=density[0])
+    density *= length
+    reach = 0.5 * np.abs(cubic[1])
+    reach += 0.25 * np.abs(cubic[2])
+    reach += 0.125 * np.abs(cubic[3])
+    depth_error = reach * (128 * ROUNDOFF)
+    depth_error += pieces.slack
+    depth_error *= np.abs(slope, out=slope)
+    depth_error += rows[column.SIGMA_OFF].take(row)
+    level *= 32 * ROUNDOFF
+    depth_error += level
+    lost = pieces.astray * astray_sigma
+    depth_error += lost
+    depth_error *= length
+    lost *= length * float(models.largest.max())
+    return offset, reach, density, depth_error, lost
+
+
+def _color(
+    models: Models, row: Indices, offset: Floats, reach: Floats
+) -> tuple[Floats, Floats, Floats | None, Floats]:
+    """Return the models' colours at the middle values, their derivatives, half their second ones, (3, n) each.
+
+    The second ones are None where all rows are straight.  Last, how far the colour leaves that of the middle.
+    """
+    rows = models.rows
+    slopes = rows[column.C1].take(row, axis=1)
+    color = rows[column.C0].take(row, axis=1)
+    if not models.bent:
+        color += slopes * offset
+        change = np.abs(slopes)
+        change *= reach
+        return color, slopes, None, change
+    bend = rows[column.C2].take(row, axis=1)
+    step = bend * offset
+    slopes += step
+    color += slopes * offset
+    slopes += step
+    change = np.abs(bend)
+    change *= reach
+    change += np.abs(slopes)
+    change *= reach
+    return color, slopes, bend, change
 
 
 def _rows(models: Models, pieces: Pieces) -> Indices:
@@ -110,6 +159,11 @@ def _rows(models: Models, pieces: Pieces) -> Indices:
     unknown = np.flatnonzero(pieces.row < 0)
     if len(unknown) == 0:
         return pieces.row
+    if len(unknown) == len(pieces.row):
+        low, high = value_range(pieces.cubic)
+        low -= pieces.slack
+        high += pieces.slack
+        return rows_of(models, low, high)
     row = pieces.row.copy()
     low, high = value_range(pieces.cubic.take(unknown, axis=1))
     slack = pieces.slack.take(unknown)
@@ -153,8 +207,8 @@ def _touching(models: Models, pieces: Pieces, at: Indices, edge: Floats) -> Floa
 
 
 def _curved(
-    models: Models, pieces: Pieces, row: Indices, offset: Floats, steepest_color: Floats, share: Floats
-):
+    models: Models, pieces: Pieces, row: Indices, offset: Floats, steepest_color: Floats, share: float
+) -> tuple[Indices, CurvedEmission] | None:
     """Return which pieces have interpolated opacity, and their emission; None if there are none."""
     if models.unit_distance is None:
         return None
@@ -171,6 +225,6 @@ def _curved(
         pieces.slack[at],
         pieces.length[at] / models.unit_distance,
         steepest_color[at],
-        share[at],
+        np.full(len(at), share),
     )
     return at, light
