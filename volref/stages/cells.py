@@ -108,14 +108,15 @@ def recentred(origins: Floats, directions: Floats, spans: Spans) -> tuple[Floats
     A ray that starts far away loses digits in o + t d at each of its pieces; moved once, with the sum and the
     product kept to twice the digits (Dekker 1971), it loses half an ulp of the new origin.
     """
-    middle = 0.5 * (spans.t_near + spans.t_far)
-    middle = np.where(np.isfinite(middle) & (spans.t_far > spans.t_near), middle, 0.0)
+    inside = spans.t_far > spans.t_near
+    t_near, t_far = (np.where(inside, t, 0.0) for t in (spans.t_near, spans.t_far))
+    middle = 0.5 * (t_near + t_far)
     product = directions * middle
     rest = _product_error(directions, middle, product)
     moved = origins + product
     virtual = moved - origins
     rest += (origins - (moved - virtual)) + (product - virtual)
-    return moved + rest, Spans(spans.t_near - middle, spans.t_far - middle)
+    return moved + rest, Spans(t_near - middle, t_far - middle)
 
 
 def _product_error(a: Floats, b: Floats, product: Floats) -> Floats:
@@ -199,7 +200,12 @@ def _lookup(flags: Booleans, wholes: list[Numbers], shift: int) -> Booleans:
 
 
 def _cubic(
-    corners: tuple[Numbers, ...], base: Indices, fraction: list[Floats], stride: list[Floats], *, precise: bool
+    corners: tuple[Numbers, ...],
+    base: Indices,
+    fraction: list[Floats],
+    stride: list[Floats],
+    *,
+    precise: bool,
 ) -> tuple[Floats, Floats, Floats]:
     """Return the cubic (4, n) of f(fraction + v stride) in the cell at `base`, and two sizes (n,).
 
@@ -221,7 +227,11 @@ def _cubic(
     slope_z = kz + kxz * x + cross_x * y
     cubic[0] = k0 + (kx * x + (ky + kxy * x) * y + slope_z * z)
     cubic[1] = slope_x * dx + slope_y * dy + slope_z * dz
-    turn_x, turn_y, turn_z = cross_z * dy + cross_y * dz, cross_z * dx + cross_x * dz, cross_y * dx + cross_x * dy
+    turn_x, turn_y, turn_z = (
+        cross_z * dy + cross_y * dz,
+        cross_z * dx + cross_x * dz,
+        cross_y * dx + cross_x * dy,
+    )
     cubic[2] = 0.5 * (turn_x * dx + turn_y * dy + turn_z * dz)
     cubic[3] = kxyz * dx * dy * dz
     if not precise:

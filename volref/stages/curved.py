@@ -83,6 +83,7 @@ def _rule(order: int) -> tuple[Floats, Floats, Floats, float]:
 def curved_emission(
     cubic: Floats,
     opacity: Floats,
+    clear: Floats,
     slope: Floats,
     slack: Floats,
     scale: Floats,
@@ -91,45 +92,64 @@ def curved_emission(
 ) -> CurvedEmission:
     """Return depth and J1 of pieces with cubics (4, n) and opacities `opacity` + `slope` g(v).
 
-    `slack` (n,) is how far the value may be off, `scale` (n,) is length / unit distance.  The order of each
-    piece is the least whose error of depth stays below `share` and that of J1 times `weight` too.
+    `clear` (n,) is 1 - `opacity`, with all its digits where that is small.  `slack` is how far the value may be
+    off, `scale` is length / unit distance.  The order of each piece is the least whose error of depth stays below
+    `share` and that of J1 times `weight` too.
     """
     n = len(scale)
     reach = 0.5 * np.abs(cubic[1]) + 0.25 * np.abs(cubic[2]) + 0.125 * np.abs(cubic[3])
-    order, depth_error, error = _orders(cubic, opacity, slope, scale, weight, share)
-    order[(opacity >= 1.0) & (slope == 0)] = 0  # opaque throughout
+    dense = clear < 0.5
+    middle = -scale * _log_clear(opacity, clear, dense)
+    order, depth_error, error = _orders(cubic, middle, clear, slope, scale, weight, share)
+    order[(clear <= 0) & (slope == 0)] = 0  # opaque throughout
     settled = order > 0
     order[~settled] = ORDERS[-1]
     depth, first = np.zeros(n), np.zeros(n)
     for k in ORDERS:
-        chosen = np.flatnonzero(order == k)
-        if len(chosen):
-            depth[chosen], first[chosen] = _integrals(
-                cubic[:, chosen], opacity[chosen], slope[chosen], scale[chosen], k
-            )
-    off = np.where(slope == 0, 0.0, np.abs(slope) * slack + 8 * ROUNDOFF)
-    clear = 1.0 - (opacity + np.abs(slope) * reach)
+        for chosen in (np.flatnonzero((order == k) & dense), np.flatnonzero((order == k) & ~dense)):
+            if len(chosen):
+                depth[chosen], first[chosen] = _integrals(
+                    cubic[:, chosen],
+                    (clear if dense[chosen[0]] else opacity)[chosen],
+                    slope[chosen],
+                    scale[chosen],
+                    k,
+                    dense=bool(dense[chosen[0]]),
+                )
+    most = clear + np.abs(slope) * reach
+    off = np.where(slope == 0, 0.0, np.abs(slope) * slack + 8 * ROUNDOFF * np.minimum(most, 1.0))
+    least = clear - np.abs(slope) * reach
     with np.errstate(divide="ignore", invalid="ignore"):
-        moved = np.where(off == 0, 0.0, np.where(clear > 2 * off, scale * (off / (clear - off)), FAR))
+        moved = np.where(off == 0, 0.0, np.where(least > 2 * off, scale * (off / (least - off)), FAR))
     depth_error += moved + 64 * ROUNDOFF * depth
     result = CurvedEmission(depth, depth_error, first, error, settled)
-    _bracket(result, cubic, opacity, slope, off, scale, reach)
+    _bracket(result, cubic, clear, slope, off, scale, reach)
     return result
 
 
+def _log_clear(opacity: Floats, clear: Floats, dense: Booleans) -> Floats:
+    """Return log(1 - opacity), finite, with all its digits at both ends."""
+    return np.where(dense, np.log(np.maximum(clear, 1e-300)), np.log1p(-np.minimum(opacity, 0.75)))
+
+
 def _orders(
-    cubic: Floats, opacity: Floats, slope: Floats, scale: Floats, weight: Floats, share: Floats
+    cubic: Floats,
+    middle: Floats,
+    clear: Floats,
+    slope: Floats,
+    scale: Floats,
+    weight: Floats,
+    share: Floats,
 ) -> tuple[Indices, Floats, Floats]:
     """Return order (0: none serves), error of the depth and of J1 (then those of the last order), (n,) each."""
     f1, f2, f3 = np.abs(cubic[1:])
     n = len(scale)
-    middle = -scale * np.log1p(-np.minimum(opacity, 1 - ROUNDOFF))
     order, depth_error, error = np.zeros(n, np.intp), np.full(n, FAR), np.full(n, FAR)
     inner = 0.5 * f1 + 0.25 * f2 + 0.125 * f3
     for rho in RHOS:
         r = (rho + 1 / rho) / 4
         value = ((f3 * r + f2) * r + f1) * r
-        q = np.abs(slope) * value / np.maximum(1.0 - opacity, 1e-300)
+        q = np.abs(slope) * value / np.maximum(clear, 1e-300)
         change = np.where(q < 0.99, -scale * np.log1p(-np.minimum(q, 0.99)), FAR)
         exponent = np.minimum(middle * (r - 0.5) + change * (r + 0.5), MOST_EXPONENT)
         with np.errstate(invalid="ignore", over="ignore"):
@@ -148,11 +168,15 @@ def _orders(
 
 
 def _integrals(
-    cubic: Floats, opacity: Floats, slope: Floats, scale: Floats, order: int
+    cubic: Floats, middle: Floats, slope: Floats, scale: Floats, order: int, *, dense: bool
 ) -> tuple[Floats, Floats]:
+    """Return depth and J1; `middle` is what is clear in the middle if the pieces are `dense`, else the opacity."""
     nodes, weights, partial, _ = _rule(order)
     values = [((cubic[3] * v + cubic[2]) * v + cubic[1]) * v for v in nodes]
-    lost = [-scale * np.log1p(-np.clip(opacity + slope * g, 0.0, 1 - ROUNDOFF)) for g in values]
+    if dense:
+        lost = [-scale * np.log(np.clip(middle - slope * g, 1e-300, 1.0)) for g in values]
+    else:
+        lost = [-scale * np.log1p(-np.clip(middle + slope * g, 0.0, 1 - ROUNDOFF)) for g in values]
     depth, first = np.zeros_like(scale), np.zeros_like(scale)
     for i, (g, amount) in enumerate(zip(values, lost, strict=True)):
         depth += weights[i] * amount
@@ -166,7 +190,7 @@ def _integrals(
 def _bracket(
     result: CurvedEmission,
     cubic: Floats,
-    opacity: Floats,
+    clear: Floats,
     slope: Floats,
     off: Floats,
     scale: Floats,
@@ -176,36 +200,32 @@ def _bracket(
     open_ = np.flatnonzero(~result.settled | (result.depth_error >= FAR))
     if len(open_) == 0:
         return
-    cubic, opacity, slope, off, scale = (
-        cubic[:, open_],
-        opacity[open_],
-        slope[open_],
-        off[open_],
-        scale[open_],
-    )
+    cubic, clear, slope, off, scale = (x[..., open_] for x in (cubic, clear, slope, off, scale))
     half = reach[open_]
     odd = 0.5 * cubic[1] + 0.125 * cubic[3]
     ends = [0.25 * cubic[2] - odd, 0.0 * odd, 0.25 * cubic[2] + odd]
-    somewhere = np.maximum.reduce([1.0 - (opacity + slope * g) for g in ends]) - off
+    somewhere = np.maximum.reduce([clear - slope * g for g in ends]) - off
     # A part of a piece may be clear nowhere beyond doubt: then its depth has no bound, and cutting makes it worse.
     result.settled[open_] = somewhere < LEAST_CLEAR * off
-    nearest = 1.0 - (opacity + np.abs(slope) * half) - off
-    farthest = np.minimum(1.0 - opacity + np.abs(slope) * half + off, 1.0)
+    nearest = clear - np.abs(slope) * half - off
+    farthest = np.minimum(clear + np.abs(slope) * half + off, 1.0)
     with np.errstate(divide="ignore", invalid="ignore"):
         low = -scale * np.log(farthest)
         high = np.where(nearest > 0, -np.log(nearest), np.inf)
         high = scale * np.fmin(high, np.where(somewhere > 0, LOGARITHM_LOSS - np.log(somewhere), np.inf))
     high = np.minimum(high, MOST_DEPTH)
-    between = 0.5 * (high - low) + 16 * ROUNDOFF * high
+    # Where the clear part falls to 0 along a straight line, the mean of -log is 1 more than at its greatest.
+    guess = np.where(nearest > 0, 0.5 * (low + high), np.minimum(low + scale, high))
+    between = np.maximum(high - guess, guess - low) + 16 * ROUNDOFF * high
     closer = ~(result.depth_error[open_] < between)
-    result.depth[open_[closer]] = (0.5 * (low + high))[closer]
+    result.depth[open_[closer]] = guess[closer]
     result.depth_error[open_[closer]] = between[closer]
     most = half * np.minimum(high, 1.0)
     unknown = ~(result.error[open_] < most)
     result.first[open_[unknown]] = 0.0
     result.error[open_[unknown]] = most[unknown]
     # An opaque piece shows the colour at its near end.
-    opaque = (opacity >= 1.0) & (slope == 0)
+    opaque = (clear <= 0) & (slope == 0)
     opaque_ones = open_[opaque]
     result.depth[opaque_ones] = OPAQUE
     result.first[opaque_ones] = ends[0][opaque]

@@ -26,13 +26,13 @@ from volref.scene.transfer import TransferFunction
 # Columns of the rows.
 CENTER, SIGMA0, SIGMA1, SIGMA_OFF, COLOR_OFF = range(5)
 C0, C1, C2 = slice(5, 8), slice(8, 11), slice(11, 14)
-# Of exact rows only: opacity at the centre and its slope; the steepest extinction and colour on the pieces
+# Of exact rows only: opacity at the centre, what is clear there (1 - opacity, exact near 1), and the slope; the steepest extinction and colour on the pieces
 # beside; what misplacing an end costs per world length; where the opacity reaches 1 without a jump here or
 # beside, its least slope, else 0.
-ALPHA0, ALPHA1, BESIDE, COLOR_BESIDE, JUMP, JUMP_LIGHT, TOUCHING = range(14, 21)
+ALPHA0, ALPHA1, BESIDE, COLOR_BESIDE, JUMP, JUMP_LIGHT, TOUCHING, CLEAR0 = range(14, 22)
 # 1 where anything can be seen, else 0.
-SEEN = 21
-COLUMNS = 22
+SEEN = 22
+COLUMNS = 23
 
 # A run has at most this many pieces, fewer in long tables so that there are at most about MOST_ROWS rows.
 LONGEST, SHORTEST, MOST_ROWS = 48, 8, 1 << 16
@@ -178,14 +178,18 @@ def rows_of(models: Models, low: Floats, high: Floats) -> Indices:
     return row
 
 
-def most_extinction(models: Models, values: Floats) -> Floats:
-    """Return a finite bound on the extinction of values (m,) that are off by rounding."""
+def look_up(models: Models, values: Floats) -> tuple[Floats, Floats, Floats]:
+    """Return for values that are off by rounding a finite bound on extinction, colour (3, m) and how far it is off."""
     slack = NEARBY * np.abs(values)
     row = rows_of(models, values - slack, values + slack)
     rows = models.rows
-    offset = np.abs(values - rows[CENTER].take(row)) + slack
-    most = rows[SIGMA0].take(row) + np.abs(rows[SIGMA1].take(row)) * offset + rows[SIGMA_OFF].take(row)
-    return np.minimum(most, models.most_sigma)
+    offset = values - rows[CENTER].take(row)
+    reach = np.abs(offset) + slack
+    extinction = rows[SIGMA0].take(row) + np.abs(rows[SIGMA1].take(row)) * reach + rows[SIGMA_OFF].take(row)
+    c1, c2 = rows[C1].take(row, axis=1), rows[C2].take(row, axis=1)
+    color = rows[C0].take(row, axis=1) + (c1 + c2 * offset) * offset
+    off = rows[COLOR_OFF].take(row) + (np.abs(c1) + 2 * np.abs(c2) * reach).max(axis=0) * slack
+    return np.minimum(extinction, models.most_sigma), color, off
 
 
 def _divided(table: TablePieces, width: float) -> TablePieces:
@@ -397,6 +401,7 @@ def _exact_rows(straight: TablePieces, off: Floats, unit_distance: float | None)
         steep = np.abs(slope[STRENGTH])
     else:
         rows[ALPHA0], rows[ALPHA1] = middle[STRENGTH], slope[STRENGTH]
+        rows[CLEAR0] = 0.5 * ((1.0 - left[STRENGTH]) + (1.0 - right[STRENGTH]))
         with np.errstate(divide="ignore", invalid="ignore"):
             clear = 1.0 - sigma.max(axis=0)
             sigma = -np.log1p(-sigma) / unit_distance

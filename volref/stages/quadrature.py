@@ -123,7 +123,9 @@ def _orders(cubic: Floats, density: Floats, limit: Floats) -> tuple[Indices, Flo
     error *= (RHO ** (-2.0 * np.array(ORDERS[:4])))[index]
     left = np.flatnonzero(index >= 2)
     if len(left):
-        index[left], error[left] = _searched(cubic.take(left, axis=1), density.take(left, axis=1), limit.take(left))
+        index[left], error[left] = _searched(
+            cubic.take(left, axis=1), density.take(left, axis=1), limit.take(left)
+        )
     return index, error
 
 

@@ -111,11 +111,12 @@ class Modelled:
 class Gathered:
     """Of the k rays that have pieces: premultiplied rgba (k, 4) and bound (k,).
 
-    share (n,): what each piece adds to the bound.
+    clear (k,): a bound on their transmittance.  share (n,): what each piece adds to the bound.
     """
 
     rgba: Floats
     bound: Floats
+    clear: Floats
     share: Floats
 
 
@@ -164,4 +165,4 @@ def gathered(pieces: Modelled, layout: Layout, behind: Floats, brightest: float)
         contrast += lost
         np.maximum(share, contrast, out=share)
     rgba[:, 3] = 1.0 - transmittance * (1.0 - behind[:, 3])
-    return Gathered(rgba, np.add.reduceat(share, layout.first) + rounding, share)
+    return Gathered(rgba, np.add.reduceat(share, layout.first) + rounding, most_left, share)

@@ -20,7 +20,7 @@ from volref.scene.scene import Scene
 from volref.scene.volume import Volume
 from volref.scene.transform import transform_directions, transform_points
 from volref.stages.cells import CellGrid, cells_along, position_error, recentred
-from volref.stages.models import Models, models_of, most_extinction, piece_of
+from volref.stages.models import Models, look_up, models_of, piece_of
 from volref.stages.radiance import ROUNDOFF, Gathered, gathered
 from volref.stages.rays import pixel_rays
 from volref.stages.sampling import PAD, Grid, padded_grid, trilinear
@@ -85,7 +85,9 @@ def prepare(scene: Scene, plan: Plan) -> Prepared:
         _steepest(volume),
     )
     low, high = volume.index_bounds
-    return Prepared(grid, cells, models_of(transfer, *volume.value_bounds), volume.index_from_world, low, high)
+    return Prepared(
+        grid, cells, models_of(transfer, *volume.value_bounds), volume.index_from_world, low, high
+    )
 
 
 def _steepest(volume: Volume) -> float:
@@ -104,33 +106,59 @@ def integrate_pixels(
 ) -> "Integral":
     """Integrate along the rays of `pixels` (R,) to `distance` (R,), over what lies `behind` (R, 4)."""
     if prepared is None:
-        return Integral(behind.copy(), np.zeros(len(pixels)), 0)
+        return Integral(behind.copy(), np.zeros(len(pixels)), np.ones(len(pixels)), 0)
     rays = pixel_rays(scene.camera, scene.width, scene.height, pixels)
     origins = transform_points(prepared.index_from_world, rays.origins).T
     directions = transform_directions(prepared.index_from_world, rays.directions).T
     spans = cut_at_surface(box_spans(origins, directions, prepared.low, prepared.high), distance)
-    origins = origins + PAD
+    origins, spans = _recentred(prepared, origins, directions, spans, distance)
     done = integrate(prepared.grid, prepared.models, origins, directions, spans, behind, tolerance)
-    done.bound[:] += _error_of_ends(prepared, origins, directions, spans) * _brightest(prepared.models, behind)
+    done.bound[:] += _error_of_ends(prepared, origins, directions, spans, behind, done)
     return done
 
 
-def _error_of_ends(prepared: Prepared, origins: Floats, directions: Floats, spans: Spans) -> Floats:
-    """Return what rounding of the spans' ends can add to the light of brightness 1, (R,).
+def _recentred(
+    prepared: Prepared, origins: Floats, directions: Floats, spans: Spans, distance: Floats
+) -> tuple[Floats, Spans]:
+    """Return padded origins in the middle of the spans, and the spans from there, their ends computed afresh.
 
-    The distance of a face, (face - o) / d, is off by at most 2 u of itself with u the unit roundoff, and once more
-    where the ray is recentred: a piece of length 3 u t may be missing or too much, of the extinction there.
+    Only a span that begins at the origin, or ends at a surface, keeps that end as it was.
     """
-    error = np.zeros(len(spans.t_near))
+    moved, moved_spans = recentred(origins + PAD, directions, spans)
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        faces = [(face[:, None] + PAD - moved) / directions for face in (prepared.low, prepared.high)]
+    parallel = directions == 0
+    near = np.where(parallel, -np.inf, np.minimum(*faces)).max(axis=0)
+    far = np.where(parallel, np.inf, np.maximum(*faces)).min(axis=0)
+    inside = spans.t_far > spans.t_near
+    near = np.where(inside & (spans.t_near > 0), near, moved_spans.t_near)
+    far = np.where(inside & (spans.t_far < distance), far, moved_spans.t_far)
+    return moved, Spans(near, np.maximum(near, far))
+
+
+def _error_of_ends(
+    prepared: Prepared, origins: Floats, directions: Floats, spans: Spans, behind: Floats, done: "Integral"
+) -> Floats:
+    """Return what rounding of the spans' ends can add to the error (R,).
+
+    The distance of a face, (face - o) / d, is off by at most 3 u of itself with u the unit roundoff: a piece of
+    that length may be missing or too much.  With tau its depth, it changes the light that leaves it by at most
+    1 - e^-tau times the difference of its colour and of what arrives: at the near end that is the image itself,
+    at the far end what lies behind, seen through all the rest.
+    """
+    error = np.zeros(len(done.bound))
     inside = np.flatnonzero(spans.t_far > spans.t_near)
-    for t in (spans.t_near[inside], spans.t_far[inside]):
-        position = np.clip(
-            origins[:, inside] + t * directions[:, inside],
-            prepared.low[:, None] + PAD,
-            prepared.high[:, None] + PAD,
-        )
-        value = trilinear(prepared.samples, position, Workspace())
-        error[inside] += 3 * ROUNDOFF * t * most_extinction(prepared.models, value)
+    low, high = prepared.low[:, None] + PAD, prepared.high[:, None] + PAD
+    near_end = spans.t_near, done.rgba, np.ones(len(error))
+    far_end = spans.t_far, behind, done.clear
+    for t, arriving, seen in (near_end, far_end):
+        t_inside = t[inside]
+        position = np.clip(origins[:, inside] + t_inside * directions[:, inside], low, high)
+        extinction, color, off = look_up(prepared.models, trilinear(prepared.samples, position, Workspace()))
+        contrast = np.abs(color.T - arriving[inside, :3]).max(axis=1) + off
+        contrast = np.maximum(contrast, 1.0 - arriving[inside, 3]) + done.bound[inside]
+        depth = np.minimum(3 * ROUNDOFF * np.abs(t_inside) * extinction, 1.0)
+        error[inside] += depth * contrast * seen[inside]
     return error
 
 
@@ -140,10 +168,14 @@ def _brightest(models: Models, behind: Floats) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Integral:
-    """Of R rays: premultiplied rgba (R, 4), bound (R,), and how many pieces were integrated."""
+    """Of R rays: premultiplied rgba (R, 4), bound (R,), and how many pieces were integrated.
+
+    clear (R,): a bound on how much of what lies behind is seen.
+    """
 
     rgba: Floats
     bound: Floats
+    clear: Floats
     pieces: int
 
 
@@ -157,12 +189,9 @@ def integrate(
     tolerance: float,
 ) -> Integral:
     """Return the integral along rays (3, R) in padded index space over what lies `behind` (R, 4)."""
-    rgba, bound = behind.copy(), np.zeros(len(behind))
-    origins, spans = recentred(origins, directions, spans)
+    rgba, bound, clear = behind.copy(), np.zeros(len(behind)), np.ones(len(behind))
     pieces = cells_along(grid, origins, directions, spans, precise=tolerance < PRECISE)
-    astray = (
-        6 * grid.steepest * float(position_error(grid, origins, directions, spans).max(initial=0.0))
-    )
+    astray = 6 * grid.steepest * float(position_error(grid, origins, directions, spans).max(initial=0.0))
     if models.blur:
         pieces = dataclasses.replace(pieces, slack=pieces.slack + models.blur)
     brightest = _brightest(models, behind)
@@ -173,19 +202,19 @@ def integrate(
         if len(pieces.ray) == 0:
             break
         rays = pieces.ray[np.append(True, pieces.ray[1:] != pieces.ray[:-1])]
-        rgba[rays], bound[rays] = behind[rays], 0.0  # all that is left of a ray may turn out to be clear
+        rgba[rays], bound[rays], clear[rays] = behind[rays], 0.0, 1.0  # all that is left of a ray may turn out to be clear
         solved = modelled(models, pieces, astray, tolerance)
         integrated += len(solved.row)
         if len(solved.row) == 0:
             break
         rays = solved.layout.rays
         result = gathered(solved.integrals, solved.layout, behind[rays], brightest)
-        rgba[rays], bound[rays] = result.rgba, result.bound
+        rgba[rays], bound[rays], clear[rays] = result.rgba, result.bound, result.clear
         bad = result.bound > tolerance
         if not bad.any() or len(solved.row) > MOST_PIECES:
             break
         pieces = _refined(models, solved, result, bad, tolerance)
-    return Integral(rgba, bound, integrated)
+    return Integral(rgba, bound, clear, integrated)
 
 
 def _cut_at_bends(models: Models, pieces: Pieces, chosen: Indices) -> Pieces:

@@ -78,7 +78,9 @@ def modelled(models: Models, pieces: Pieces, astray: float, tolerance: float) ->
     opacity = -np.expm1(-depth)
     steepest_color *= in_front
     np.maximum(steepest_color, 1e-300, out=steepest_color)
-    straight = moments(cubic=pieces.cubic, density=density, limit=share / steepest_color, second=bend is not None)
+    straight = moments(
+        cubic=pieces.cubic, density=density, limit=share / steepest_color, second=bend is not None
+    )
     if curved is not None:
         straight.first[at], straight.error[at] = light.first, light.error
     shine, error = color * opacity, np.abs(slopes)
@@ -216,12 +218,12 @@ def _curved(
     if len(at) == 0:
         return None
     rows, row = models.rows, row[at]
-    slope = rows[column.ALPHA1].take(row)
-    opacity = rows[column.ALPHA0].take(row) + slope * offset[at]
+    rise = rows[column.ALPHA1].take(row) * offset[at]
     light = curved_emission(
         pieces.cubic.take(at, axis=1),
-        np.clip(opacity, 0.0, 1.0),
-        slope,
+        np.clip(rows[column.ALPHA0].take(row) + rise, 0.0, 1.0),
+        np.clip(rows[column.CLEAR0].take(row) - rise, 0.0, 1.0),
+        rows[column.ALPHA1].take(row),
         pieces.slack[at],
         pieces.length[at] / models.unit_distance,
         steepest_color[at],
