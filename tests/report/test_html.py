@@ -27,7 +27,12 @@ def scene():
 
 @pytest.fixture(scope="module")
 def out(scene):
-    return vr.render(scene, threads=1)
+    return vr.render(scene, method="exact", threads=1)
+
+
+@pytest.fixture(scope="module")
+def march(scene):
+    return vr.render(scene, method="march", threads=1)
 
 
 @pytest.fixture(scope="module")
@@ -108,18 +113,22 @@ def test_the_pictures_are_the_results_pixel_for_pixel(html, out):
     np.testing.assert_array_equal(error, error_map(out.bound).colors)
 
 
-def test_the_numbers_on_the_page_are_the_results(html, out):
-    page = Page(html)
+@pytest.mark.parametrize(
+    ("method", "kind", "work"), [("exact", "certified", "piece"), ("march", "estimated", "sample")]
+)
+def test_the_numbers_on_the_page_are_the_results(scene, method, kind, work):
+    out = vr.render(scene, method=method, threads=1)
+    page = Page(render_page(scene, out, title="t", figures=[("reading", "1.25 s")]))
     figures = dict(zip(page.texts("dt"), page.texts("dd"), strict=True))
     assert figures == {
-        "estimated error, largest": f"{levels(out.bound.max())} / 255",
-        "estimated error, 99% of pixels below": f"{levels(np.quantile(out.bound, 0.99))} / 255",
-        "estimated error, median": f"{levels(np.median(out.bound))} / 255",
+        f"{kind} error, largest": f"{levels(out.bound.max())} / 255",
+        f"{kind} error, 99% of pixels below": f"{levels(np.quantile(out.bound, 0.99))} / 255",
+        f"{kind} error, median": f"{levels(np.median(out.bound))} / 255",
         "pixels within 0.5 / 255": figures["pixels within 0.5 / 255"],
         "rendering": f"{out.seconds:.2f} s",
         "threads": "1",
-        "samples": f"{out.samples:,}",
-        "wall time per sample": f"{out.seconds * 1e9 / out.samples:.0f} ns",
+        f"{work}s": f"{out.samples:,}",
+        f"wall time per {work}": f"{out.seconds * 1e9 / out.samples:.0f} ns",
         "reading": "1.25 s",
     }
     share = 100 * np.count_nonzero(out.bound * 510 <= 1) / out.bound.size
@@ -127,14 +136,23 @@ def test_the_numbers_on_the_page_are_the_results(html, out):
     assert 0 <= share - stated < 0.1  # rounded down to a tenth of a percent
 
 
-def test_an_estimate_is_called_one(html):
-    text = " ".join(Page(html).texts("section"))
+def test_an_estimate_is_called_one(scene, march):
+    page = Page(render_page(scene, march, title="t"))
+    text = " ".join(page.texts("section"))
     assert "An estimate, not a proven bound" in text
-    assert "proven error" not in text
+    assert "ertified" not in text
+    assert page.texts("strong")[0].startswith("Estimated error at most")
+
+
+def test_certified_is_said_with_what_it_means(html):
+    page = Page(html)
+    assert page.texts("strong")[0].startswith("Certified error at most")
+    assert any(text.startswith("Certified means proven: no pixel is further") for text in page.texts("p"))
+    assert "stimate" not in " ".join(page.texts("section"))
 
 
 @pytest.mark.parametrize(
-    ("kind", "words"), [("certified", "Proven error at most"), ("none", "Error unknown; rendered in")]
+    ("kind", "words"), [("certified", "Certified error at most"), ("none", "Error unknown; rendered in")]
 )
 def test_the_sentence_under_the_picture_says_what_the_error_is(scene, out, kind, words):
     page = Page(render_page(scene, dataclasses.replace(out, bound_kind=kind), title="t"))
@@ -142,17 +160,30 @@ def test_the_sentence_under_the_picture_says_what_the_error_is(scene, out, kind,
     assert any("error, largest" in name for name in page.texts("dt")) == (kind == "certified")
 
 
-def test_each_stage_of_the_plan_is_told_with_its_reason(html, out):
-    rows = [text for text in Page(html).texts("tr") if text]
+@pytest.mark.parametrize("method", ["exact", "march"])
+def test_each_stage_of_the_plan_is_told_with_its_reason(scene, method):
+    out = vr.render(scene, method=method, threads=1)
+    rows = [text for text in Page(render_page(scene, out, title="t")).texts("tr") if text]
     for stage in out.plan.stages:
         place = "in" if stage.included else "left out"
         assert f"{stage.name}{place}{stage.reason}" in rows
 
 
+def test_the_exact_method_has_no_step(scene, html, march):
+    told = next(text for text in Page(html).texts("p") if text.startswith("Method exact: rays are cut"))
+    assert "there is no step. Stages left out: " in told
+    marched = Page(render_page(scene, march, title="t"))
+    told = next(text for text in marched.texts("p") if text.startswith("Method march: "))
+    assert f"a sample every {march.plan.step:g} world units, at most {march.plan.most_segments}" in told
+    bare = dataclasses.replace(scene, volume=None, transfer=None)
+    page = Page(render_page(bare, vr.render(bare, method="exact", threads=1), title="t"))
+    assert any(text.startswith("Method exact. Stages left out: volume") for text in page.texts("p"))
+
+
 def test_what_was_left_out_is_named(scene):
     clear = dataclasses.replace(scene, meshes=())
-    page = Page(render_page(clear, vr.render(clear, threads=1), title="t"))
-    told = next(text for text in page.texts("p") if text.startswith("Method march"))
+    page = Page(render_page(clear, vr.render(clear, method="exact", threads=1), title="t"))
+    told = next(text for text in page.texts("p") if text.startswith("Method exact"))
     assert "Stages left out: meshes," in told
     assert "No ray meets a surface." in page.texts("p")
 
@@ -168,7 +199,7 @@ def test_the_facts_of_the_scene_are_on_the_page(html):
 
 def test_a_scene_of_meshes_only_has_a_page(scene):
     bare = dataclasses.replace(scene, volume=None, transfer=None)
-    page = Page(render_page(bare, vr.render(bare, threads=1), title="t"))
+    page = Page(render_page(bare, vr.render(bare, method="exact", threads=1), title="t"))
     assert "wall time per sample" not in page.texts("dt")
     assert "volume" not in page.texts("th")[-8:]
 

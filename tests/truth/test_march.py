@@ -1,4 +1,5 @@
 import dataclasses
+import functools
 import math
 
 import numpy as np
@@ -15,6 +16,9 @@ from volref.phantoms import transfer as phantom_tables
 from volref.truth import rendering
 
 EPS = np.finfo(np.float64).eps
+
+march = functools.partial(vr.render, method="march")
+march_plan = functools.partial(vr.plan, method="march")
 
 
 def rms(difference):
@@ -40,7 +44,7 @@ def test_a_homogeneous_box_is_exact(extinction):
     transfer = vr.TransferFunction([0.0], [color], [extinction])
     volume = vr.Volume(np.zeros((5, 6, 7), np.uint8), spacing=(1.0, 0.7, 1.3), origin=(-1, 2, 0.5))
     scene = vr.Scene(volume, transfer, camera_towards(volume), 24, 16)
-    out = vr.render(scene)
+    out = march(scene)
     low, high = volume.corners.min(axis=0), volume.corners.max(axis=0)
     for y in range(16):
         for x in range(24):
@@ -57,14 +61,14 @@ def test_a_homogeneous_box_is_exact(extinction):
 def test_the_error_falls_with_the_square_of_the_step(scene_of):
     scene, truth = scene_of(width=24, height=18)
     steps = np.array([0.2, 0.1, 0.05, 0.025])
-    errors = [rms(vr.render(scene, step=step).rgba - truth) for step in steps]
+    errors = [rms(march(scene, step=step).rgba - truth) for step in steps]
     assert order_of(errors, steps) == pytest.approx(2.0, abs=0.1)
 
 
 def test_a_jump_in_the_table_costs_one_order():
     scene, truth = phantoms.ball_scene(width=24, height=18)
     steps = np.array([0.2, 0.1, 0.05, 0.025])
-    errors = [rms(vr.render(scene, step=step).rgba - truth) for step in steps]
+    errors = [rms(march(scene, step=step).rgba - truth) for step in steps]
     # A surface is missed by half a step on average: first order, and by chance from ray to ray.
     assert order_of(errors, steps) == pytest.approx(1.0, abs=0.15)
 
@@ -72,11 +76,11 @@ def test_a_jump_in_the_table_costs_one_order():
 def test_the_opacity_of_a_linear_extinction_is_exact_and_of_a_bent_one_is_not():
     # The midpoint rule integrates polynomials of degree 1 exactly, and not those of degree 2.
     scene, truth = phantoms.ramp_scene(width=12, height=9)
-    error = vr.render(scene, step=0.5).rgba - truth
+    error = march(scene, step=0.5).rgba - truth
     assert np.abs(error[..., 3]).max() <= 40 * EPS  # some 20 segments at two roundings each
     assert np.abs(error[..., :3]).max() > 1e-4
     scene, truth = phantoms.exponential_scene(width=12, height=9)
-    assert np.abs(vr.render(scene, step=0.5).rgba - truth)[..., 3].max() > 1e-4
+    assert np.abs(march(scene, step=0.5).rgba - truth)[..., 3].max() > 1e-4
 
 
 @pytest.mark.parametrize("centering", ["cell", "node"])
@@ -91,7 +95,7 @@ def test_images_equal_the_scalar_loop(dtype, centering, opacity):
         transfer = vr.TransferFunction(knots, colors5(), opacity=[0, 0, 0.3, 0.6, 1.0], unit_distance=0.7)
     camera = camera_towards(volume)
     scene = vr.Scene(volume, transfer, camera, 6, 5, background=(0.1, 0.2, 0.3, 0.5))
-    out = vr.render(scene, plan=vr.plan(scene, step=0.3).everything())
+    out = march(scene, plan=march_plan(scene, step=0.3).everything())
     low, high = volume.corners.min(axis=0), volume.corners.max(axis=0)
     eye = camera.world_from_view[:3, 3]
     for y in range(5):
@@ -121,9 +125,9 @@ def test_oblique_directions_and_flips_place_the_same_field():
         straight.view_from_world @ world_turn.T, "perspective", fov_y=35.0, near=0.1, far=100.0
     )
     transfer = colorful_transfer()
-    expected = vr.render(vr.Scene(volume, transfer, straight, 16, 12)).rgba
+    expected = march(vr.Scene(volume, transfer, straight, 16, 12)).rgba
     for other in (turned, flipped):
-        got = vr.render(vr.Scene(other, transfer, camera, 16, 12)).rgba
+        got = march(vr.Scene(other, transfer, camera, 16, 12)).rgba
         np.testing.assert_allclose(got, expected, rtol=0, atol=1e-12)  # positions to 1e-14, slopes of 10
 
 
@@ -134,16 +138,16 @@ def test_skipping_empty_space_changes_nothing(seed, top):
     blank = scene.volume.values.copy()
     blank[:, :, 4:13] *= 0.2
     scene = dataclasses.replace(scene, volume=vr.Volume(blank))
-    planned = dataclasses.replace(vr.plan(scene), termination=0.0)
+    planned = dataclasses.replace(march_plan(scene), termination=0.0)
     everything = planned.everything()
-    np.testing.assert_array_equal(vr.render(scene, plan=planned).rgba, vr.render(scene, plan=everything).rgba)
+    np.testing.assert_array_equal(march(scene, plan=planned).rgba, march(scene, plan=everything).rgba)
 
 
 def test_empty_space_is_left_out_and_saves_samples():
     scene = sparse_scene(40, 32)
-    plan = vr.plan(scene)
+    plan = march_plan(scene)
     assert plan.includes("empty space")
-    planned, everything = vr.render(scene, plan=plan), vr.render(scene, plan=plan.everything())
+    planned, everything = march(scene, plan=plan), march(scene, plan=plan.everything())
     np.testing.assert_array_equal(planned.rgba, everything.rgba)
     assert planned.samples < everything.samples / 3
 
@@ -154,9 +158,9 @@ def test_what_an_early_end_leaves_out_is_within_the_bound(brightness):
     transfer = vr.TransferFunction([0.0], [(brightness, 0.0, 0.0)], [1.0])
     volume = vr.Volume(np.zeros((8, 8, 8), np.uint8))
     scene = vr.Scene(volume, transfer, camera_towards(volume), 24, 16, background=(0, 2 * brightness, 0, 1))
-    plan = dataclasses.replace(vr.plan(scene), termination=0.3)
+    plan = dataclasses.replace(march_plan(scene), termination=0.3)
     never = dataclasses.replace(plan, termination=0.0)
-    early, full = vr.render(scene, plan=plan), vr.render(scene, plan=never)
+    early, full = march(scene, plan=plan), march(scene, plan=never)
     difference = np.abs(early.rgba - full.rgba).max(axis=-1)
     ended = early.rgba[..., 1] > full.rgba[..., 1] + 1e-3  # more of the background is left
     assert ended.sum() > 20
@@ -177,9 +181,9 @@ def test_light_brighter_than_one_counts_in_what_an_early_end_leaves_out():
     eye, target = (-30.0, 1.5, 1.5), (0.0, 1.5, 1.5)
     camera = vr.Camera.orthographic(eye, target, (0, 0, 1), 1.0, 0.0, 100.0)
     scene = vr.Scene(volume, transfer, camera, 1, 1)
-    plan = dataclasses.replace(vr.plan(scene), termination=0.05)
-    early = vr.render(scene, plan=plan)
-    full = vr.render(scene, plan=dataclasses.replace(plan, termination=0.0))
+    plan = dataclasses.replace(march_plan(scene), termination=0.05)
+    early = march(scene, plan=plan)
+    full = march(scene, plan=dataclasses.replace(plan, termination=0.0))
     lost = np.abs(early.rgba - full.rgba).max()
     assert lost > 0.05
     assert lost <= early.bound[0, 0]
@@ -187,10 +191,10 @@ def test_light_brighter_than_one_counts_in_what_an_early_end_leaves_out():
 
 def test_the_image_does_not_depend_on_threads_or_chunks(monkeypatch):
     scene = rough_scene(40, 30)
-    expected = vr.render(scene, threads=1)
+    expected = march(scene, threads=1)
     for threads, chunk in ((1, 7), (2, 64), (3, 1200)):
         monkeypatch.setattr(rendering, "RAYS_PER_CHUNK", chunk)
-        out = vr.render(scene, threads=threads)
+        out = march(scene, threads=threads)
         np.testing.assert_array_equal(out.rgba, expected.rgba)
         np.testing.assert_array_equal(out.bound, expected.bound)
 
@@ -199,7 +203,7 @@ def test_the_image_does_not_depend_on_threads_or_chunks(monkeypatch):
 def test_the_estimate_covers_the_error_of_most_pixels(seed, step):
     # An estimate is not a bound: on independent random voxels, rougher than any data, 93 % is asked here.
     scene = rough_scene(24, 16, seed=seed)
-    out, truth = vr.render(scene, step=step), vr.render(scene, step=step / 64)
+    out, truth = march(scene, step=step), march(scene, step=step / 64)
     error = np.abs(out.rgba - truth.rgba).max(axis=-1)
     hit = out.rgba[..., 3] > 0
     assert (error <= out.bound)[hit].mean() >= 0.93
@@ -209,7 +213,7 @@ def test_the_estimate_covers_the_error_of_most_pixels(seed, step):
 def test_the_estimate_tends_to_eight_times_the_error_of_a_smooth_scene():
     # C(3h) - C(h) = (9 - 1) k h^2
     scene, truth = phantoms.ramp_scene(width=12, height=9)
-    out = vr.render(scene, step=0.02)
+    out = march(scene, step=0.02)
     error = np.abs(out.rgba - truth).max(axis=-1)
     inside = error > 1e-8
     assert np.median(out.bound[inside] / error[inside]) == pytest.approx(8.0, rel=0.1)
@@ -217,16 +221,16 @@ def test_the_estimate_tends_to_eight_times_the_error_of_a_smooth_scene():
 
 def test_met_tolerance_compares_the_bound_with_the_tolerance():
     scene = rough_scene(12, 8)
-    worst = vr.render(scene).bound.max()
-    assert vr.render(scene, tolerance=worst * 1.01).met_tolerance
-    assert not vr.render(scene, tolerance=worst * 0.99).met_tolerance
+    worst = march(scene).bound.max()
+    assert march(scene, tolerance=worst * 1.01).met_tolerance
+    assert not march(scene, tolerance=worst * 0.99).met_tolerance
 
 
 def test_a_camera_inside_the_volume_sees_what_is_in_front_of_it():
     transfer = vr.TransferFunction([0.0], [(1, 1, 1)], [0.25])
     volume = vr.Volume(np.zeros((8, 8, 8)))
     camera = vr.Camera.look_at((3.5, 3.5, 3.5), (9, 3.5, 3.5), (0, 0, 1), 1e-3, 0.1, 10)
-    out = vr.render(vr.Scene(volume, transfer, camera, 1, 1))
+    out = march(vr.Scene(volume, transfer, camera, 1, 1))
     assert out.rgba[0, 0, 3] == pytest.approx(-math.expm1(-0.25 * 4.0), abs=1e-14)  # 16 segments
 
 
@@ -234,21 +238,21 @@ def test_a_camera_that_looks_along_a_face_sees_the_face():
     transfer = vr.TransferFunction([0.0], [(1, 1, 1)], [0.25])
     volume = vr.Volume(np.zeros((8, 8, 8)), centering="node")
     camera = vr.Camera.orthographic((-5, 0, 3.5), (0, 0, 3.5), (0, 0, 1), 1e-3, 0, 100)
-    out = vr.render(vr.Scene(volume, transfer, camera, 1, 1))
+    out = march(vr.Scene(volume, transfer, camera, 1, 1))
     assert out.rgba[0, 0, 3] == pytest.approx(-math.expm1(-0.25 * 7.0), abs=1e-14)
 
 
 @pytest.mark.parametrize("extinction", [1e4, 1e300])
 def test_stiff_extinctions_end_rays_without_a_warning(extinction):
     transfer = vr.TransferFunction([0, 1], [(1, 0.5, 0)] * 2, [0, extinction])
-    out = vr.render(rough_scene(12, 8, transfer=transfer))
+    out = march(rough_scene(12, 8, transfer=transfer))
     assert np.isfinite(out.rgba).all()
     assert out.rgba.max() <= 1.0
 
 
 def test_a_transparent_volume_costs_no_samples_and_leaves_the_background():
     transfer = vr.TransferFunction([0, 1], [(1, 1, 1)] * 2, [0, 0])
-    out = vr.render(rough_scene(12, 8, transfer=transfer, background=(0.1, 0.2, 0.3, 0.4)))
+    out = march(rough_scene(12, 8, transfer=transfer, background=(0.1, 0.2, 0.3, 0.4)))
     assert out.samples == 0
     assert (out.rgba == [0.1, 0.2, 0.3, 0.4]).all()
     assert (out.bound == 0).all()
@@ -256,7 +260,7 @@ def test_a_transparent_volume_costs_no_samples_and_leaves_the_background():
 
 def test_progress_reaches_the_end():
     seen = []
-    vr.render(rough_scene(12, 8), progress=lambda done, total: seen.append((done, total)))
+    march(rough_scene(12, 8), progress=lambda done, total: seen.append((done, total)))
     assert seen[-1][0] == seen[-1][1]
 
 
@@ -265,7 +269,7 @@ def test_an_exception_in_progress_stops_the_rendering():
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        vr.render(rough_scene(12, 8), progress=stop)
+        march(rough_scene(12, 8), progress=stop)
 
 
 def test_a_step_that_would_run_for_hours_is_refused():
@@ -273,13 +277,13 @@ def test_a_step_that_would_run_for_hours_is_refused():
     transfer = vr.TransferFunction([0.0], [(1, 1, 1)], [1e-8])
     scene = vr.Scene(volume, transfer, camera_towards(volume), 2, 2)
     with pytest.raises(vr.SceneError, match="step must be stated"):
-        vr.plan(scene)
-    assert vr.plan(scene, step=1e5).step == 1e5
+        march_plan(scene)
+    assert march_plan(scene, step=1e5).step == 1e5
 
 
 def test_early_termination_is_planned_only_where_it_can_happen():
     scene = rough_scene(12, 8, transfer=colorful_transfer(extinction=0.5))
-    assert not vr.plan(scene).includes("early termination")
+    assert not march_plan(scene).includes("early termination")
     assert planning.TERMINATION == 1e-6
 
 
@@ -291,7 +295,7 @@ def test_an_exception_in_a_thread_ends_the_rendering(monkeypatch, threads):
     monkeypatch.setattr(rendering, "march_chunk", fail)
     monkeypatch.setattr(rendering, "RAYS_PER_CHUNK", 8)  # more chunks than threads
     with pytest.raises(MemoryError):
-        vr.render(rough_scene(12, 8), threads=threads)
+        march(rough_scene(12, 8), threads=threads)
 
 
 def test_an_opacity_that_rounds_past_one_is_one():
@@ -301,33 +305,33 @@ def test_an_opacity_that_rounds_past_one_is_one():
     values[0], values[-1] = 0.0, 1.0
     volume = vr.Volume(values)
     for step in (None, 1.0, 0.3):
-        out = vr.render(vr.Scene(volume, transfer, camera_towards(volume), 8, 8), step=step)
+        out = march(vr.Scene(volume, transfer, camera_towards(volume), 8, 8), step=step)
         assert np.isfinite(out.rgba).all()
         assert out.rgba.max() <= 1.0 + 1e-15
     constant = vr.Volume(np.full((4, 4, 4), 107.99999999999999))
     transfer = vr.TransferFunction.from_opacity([-710, 108], [(1, 1, 1)] * 2, [0.18, 1.0])
-    assert vr.plan(vr.Scene(constant, transfer, camera_towards(constant), 8, 8)).includes("volume")
+    assert march_plan(vr.Scene(constant, transfer, camera_towards(constant), 8, 8)).includes("volume")
 
 
 def test_the_plan_of_another_scene_is_refused():
     scene, other = rough_scene(12, 8), rough_scene(12, 8, seed=1)
     with pytest.raises(vr.SceneError, match="the plan of another volume"):
-        vr.render(other, plan=vr.plan(scene))
+        march(other, plan=march_plan(scene))
     with pytest.raises(vr.SceneError, match="the plan of another volume"):
-        vr.trace(other, (0, 0), plan=vr.plan(scene))
+        vr.trace(other, (0, 0), plan=march_plan(scene))
     larger = dataclasses.replace(scene, width=20)
-    assert vr.render(larger, plan=vr.plan(scene)).rgba.shape == (8, 20, 4)
+    assert march(larger, plan=march_plan(scene)).rgba.shape == (8, 20, 4)
 
 
 @pytest.mark.parametrize("more", [{"step": 0.1}, {"method": "exact"}, {"tolerance": 0.5}])
 def test_a_plan_stands_alone(more):
     scene = rough_scene(12, 8)
     with pytest.raises(vr.SceneError, match="plan must stand alone"):
-        vr.render(scene, plan=vr.plan(scene), **more)
+        march(scene, plan=march_plan(scene), **more)
 
 
 def test_a_word_is_no_plan():
     with pytest.raises(vr.SceneError, match=r"plan must be a volref.Plan, got str"):
-        vr.render(rough_scene(12, 8), plan="march")
+        march(rough_scene(12, 8), plan="march")
     with pytest.raises(vr.SceneError, match=r"scene must be a volref.Scene, got NoneType"):
-        vr.render(None)
+        march(None)

@@ -11,6 +11,10 @@ if TYPE_CHECKING:
     from volref.scene import Scene
 
 
+# Those of volref.planning, which would be dear to import for a help text.
+METHODS = ("auto", "march", "exact")
+
+
 def fraction(text: str) -> float:
     """Return the number that `text` says, such as 0.002 or 1/510.
 
@@ -149,18 +153,31 @@ def add_limit(parser: argparse.ArgumentParser) -> None:
 
 
 def add_accuracy(parser: argparse.ArgumentParser) -> None:
-    """Add --step and --tolerance."""
-    parser.add_argument(
-        "--step",
-        type=fraction,
-        metavar="L",
-        help="length of a segment in world units; default half the least voxel spacing",
-    )
+    """Add --tolerance, --allow-estimate, --method and --step."""
     parser.add_argument(
         "--tolerance",
         type=fraction,
         metavar="E",
         help="error per pixel to stay below, e.g. 1/1000; default 1/510, half a level of an 8-bit image",
+    )
+    parser.add_argument(
+        "--allow-estimate",
+        action="store_true",
+        help="let 'auto' answer with an estimated error where that is cheaper; by default the error is "
+        "certified: proven, for every pixel",
+    )
+    parser.add_argument(
+        "--method",
+        choices=METHODS,
+        default="auto",
+        help="'exact' has a certified error; 'march', a uniform step, an estimated one; 'auto', the default, "
+        "takes the cheapest that meets the tolerance",
+    )
+    parser.add_argument(
+        "--step",
+        type=fraction,
+        metavar="L",
+        help="march with segments of this length in world units; default half the least voxel spacing",
     )
 
 
@@ -222,9 +239,14 @@ def read_statements(options: argparse.Namespace) -> dict[str, Any]:
 
 
 def accuracy(options: argparse.Namespace) -> dict[str, Any]:
-    """Return the keyword arguments that --step and --tolerance stand for."""
+    """Return the keyword arguments that the options of `add_accuracy` stand for; --step asks for a march."""
+    marching = options.method == "auto" and options.step is not None
     given = {"step": options.step, "tolerance": options.tolerance}
-    return {name: value for name, value in given.items() if value is not None}
+    return {
+        "method": "march" if marching else options.method,
+        "certified": not options.allow_estimate,
+        **{name: value for name, value in given.items() if value is not None},
+    }
 
 
 def read_scene(options: argparse.Namespace) -> "Scene":

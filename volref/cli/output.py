@@ -12,6 +12,7 @@ CURES = (
     ("pass allow_outside=True", "pass --allow-outside"),
     ("pass max_bytes=", "pass --max-bytes "),
     ("pass step=", "pass --step"),
+    ("pass method='march'", "pass --method march"),
     ("pass them or", "pass them with -D or"),
 )
 

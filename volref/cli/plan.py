@@ -28,8 +28,8 @@ VERB = Verb(
     "plan",
     "each stage of rendering a scene, in or out, and why",
     (
-        ("plan scene.json", "which stages this scene needs, and its step"),
-        ("plan scene.json --step 0.25 --json", "the same for another step, for a program"),
+        ("plan scene.json", "which method and stages this scene takes"),
+        ("plan scene.json --step 0.25 --json", "those of a march at this step, for a program"),
     ),
     _arguments,
     _run,

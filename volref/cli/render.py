@@ -12,6 +12,7 @@ from volref.cli.options import (
     add_json,
     add_scene,
     add_work,
+    fraction,
     read_scene,
 )
 from volref.cli.output import note, print_json, progress
@@ -39,6 +40,12 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_accuracy(parser)
     parser.add_argument(
+        "--max-seconds",
+        type=fraction,
+        metavar="S",
+        help="begin nothing more after S seconds; what is not finished then has a larger error, and says so",
+    )
+    parser.add_argument(
         "--verify",
         type=int,
         metavar="N",
@@ -56,18 +63,24 @@ def _run(options: argparse.Namespace) -> int:
     _check_targets(targets, force=options.force)
     scene = read_scene(options)
     with progress("render", quiet=options.quiet) as show:
-        out = render(scene, threads=options.threads, progress=show, **accuracy(options))
+        out = render(
+            scene,
+            threads=options.threads,
+            max_seconds=options.max_seconds,
+            progress=show,
+            **accuracy(options),
+        )
     for target in targets:
         out.save(target, overwrite=options.force)
     checked = None if options.verify is None else _verified(scene, out, options)
     if options.json:
         print_json(_figures(out, options.output) | ({"verification": checked.as_dict()} if checked else {}))
-    elif not options.quiet:
+    if not options.quiet:
         note(_summary(out, options.output))
     if checked is not None and not (options.quiet and checked.ok):
         note(str(checked))
     if not out.met_tolerance:
-        note(_shortfall(out))
+        note(_shortfall(out, options.max_seconds))
     return GOOD if out.met_tolerance and (checked is None or checked.ok) else DIFFERS
 
 
@@ -103,6 +116,7 @@ def _figures(out: "Render", outputs: list[str]) -> dict[str, Any]:
         "width": out.rgba.shape[1],
         "height": out.rgba.shape[0],
         "seconds": out.seconds,
+        "method": out.plan.method,
         "samples": out.samples,
         "threads": out.threads,
         "bound": {
@@ -117,34 +131,38 @@ def _figures(out: "Render", outputs: list[str]) -> dict[str, Any]:
 
 
 def _summary(out: "Render", outputs: list[str]) -> str:
-    height, width = out.rgba.shape[:2]
-    return (
-        f"{width} x {height} pixels in {out.seconds:.2f} s, {out.samples:,} samples, largest error "
-        f"{out.bound.max():.3g} ({out.bound_kind}); wrote {', '.join(outputs)}"
-    )
+    from volref.report.figures import error_and_time
+
+    return f"{error_and_time(out)}, method {out.plan.method}; wrote {', '.join(outputs)}"
 
 
-def _shortfall(out: "Render") -> str:
-    """Say by how much the tolerance is missed, and which step should meet it."""
+def _shortfall(out: "Render", max_seconds: float | None) -> str:
+    """Say by how much the tolerance is missed, and what should meet it."""
     largest, tolerance = float(out.bound.max()), out.plan.tolerance
     missed = int((out.bound > tolerance).sum())
     message = f"tolerance not met: error {largest:.3g} ({out.bound_kind}) above {tolerance:.3g} in {missed} "
     message += f"pixel{'s' * (missed > 1)}"
+    if max_seconds is not None and out.seconds >= max_seconds:
+        return f"{message}; the time was up: raise --max-seconds or --tolerance"
+    if not out.plan.step:
+        return f"{message}; float64 cannot tell more: raise --tolerance"
     if out.plan.termination >= tolerance:
         return f"{message}; rays end at a transmittance of {out.plan.termination:g}: raise --tolerance"
     # The error falls with the square of the step.
     halvings = max(1, math.ceil(math.log(largest / tolerance, 4)))
-    return f"{message}; try --step {out.plan.step / 2**halvings:.6g} or raise --tolerance"
+    step = f"{out.plan.step / 2**halvings:.6g}"
+    return f"{message}; try --step {step}, or --method exact, or raise --tolerance"
 
 
 VERB = Verb(
     "render",
     "the image of a scene, and how far from the truth it may be",
     (
-        ("render scene.json -o image.png", "an image for people"),
-        ("render scene.json -o image.png -o image.npz --json", "also exact, with the figures as JSON"),
-        ("render scene.json -o fine.npy --step 0.1 --tolerance 1/5000", "a finer step, a stricter tolerance"),
-        ("render scene.json -o small.png --size 160x120 -j 1", "a quick look on one core"),
+        ("render scene.json -o image.png", "an image for people, its error certified below half a level"),
+        ("render scene.json -o image.png -o image.npz --json", "also all digits, and the figures as JSON"),
+        ("render scene.json -o fine.npy --tolerance 1e-9", "a stricter tolerance"),
+        ("render scene.json -o quick.png --max-seconds 5", "what can be certified in five seconds"),
+        ("render scene.json -o look.png --step 1 --tolerance 1", "a quick march, its error estimated"),
         ("render scene.json -o image.npy --verify 64", "with 64 of its rays checked at 30 digits"),
     ),
     _arguments,

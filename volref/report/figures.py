@@ -1,6 +1,7 @@
 """The numbers that belong under an image: how far off it may be, and what it cost."""
 
 from dataclasses import dataclass
+from decimal import ROUND_CEILING, Context
 
 import numpy as np
 
@@ -13,7 +14,11 @@ KINDS = {
         "estimated",
         "An estimate, not a proven bound: it compares the image with a coarser one of the same ray samples.",
     ),
-    "certified": ("proven", "A proven bound: no pixel is further from the integral than this."),
+    "certified": (
+        "certified",
+        "Certified means proven: no pixel is further than this from the emission-absorption integral along "
+        "its ray, rounding included.",
+    ),
     "none": ("unknown", "No error is known for this image."),
 }
 
@@ -28,6 +33,8 @@ class Figures:
         Of the error per pixel (the largest over the four channels), in the working space.
     error_kind
         "estimate", "certified" or "none".
+    method
+        The method that answered: "exact" or "march".
     within
         Part of the pixels, 0..1, whose error does not exceed `tolerance`.
     tolerance
@@ -35,15 +42,16 @@ class Figures:
     seconds, threads
         Wall time of the rendering, and the threads it ran on.
     samples
-        Values interpolated.
+        Values interpolated by a march, pieces integrated by "exact".
     ns_per_sample
-        Wall time per value in nanoseconds; None without samples.
+        Wall time for each of them in nanoseconds; None without any.
     """
 
     error_max: float
     error_p99: float
     error_median: float
     error_kind: str
+    method: str
     within: float
     tolerance: float
     seconds: float
@@ -73,6 +81,7 @@ def figures_of(out: Render) -> Figures:
         error_p99=p99,
         error_median=median,
         error_kind=out.bound_kind,
+        method=out.plan.method,
         within=float((out.bound <= out.plan.tolerance).mean()),
         tolerance=out.plan.tolerance,
         seconds=out.seconds,
@@ -82,12 +91,33 @@ def figures_of(out: Render) -> Figures:
     )
 
 
+def error_and_time(out: Render) -> str:
+    """Return the largest error of an image and its cost, in a line that begins with the error."""
+    if out.bound_kind == "none":
+        return f"error unknown, {duration(out.seconds)}"
+    return f"error <= {levels(out.bound.max())}/255 ({KINDS[out.bound_kind][0]}), {duration(out.seconds)}"
+
+
 def levels(error: float) -> str:
-    """Return an error of the working space in 8-bit levels, three digits.
+    """Return an error of the working space in 8-bit levels: three digits, rounded up to stay a bound.
+
+    Rounding of the division, far below a digit shown, is forgiven: 1/510 is half a level.
 
     Examples
     --------
-    >>> levels(1 / 510), levels(0.0), levels(2e-9)
-    ('0.5', '0', '5.1e-07')
+    >>> levels(1 / 510), levels(0.0), levels(2e-9), levels(0.3741 / 255)
+    ('0.5', '0', '5.1e-07', '0.375')
     """
-    return f"{error / LEVEL:.3g}"
+    nearest = Context(prec=12).create_decimal_from_float(float(error) / LEVEL)
+    return f"{float(Context(prec=3, rounding=ROUND_CEILING).plus(nearest)):.3g}"
+
+
+def duration(seconds: float) -> str:
+    """Return a time in words.
+
+    Examples
+    --------
+    >>> duration(0.0234), duration(2.14), duration(61.0)
+    ('0.023 s', '2.1 s', '61.0 s')
+    """
+    return f"{seconds:.1f} s" if seconds >= 1 else f"{seconds:.2g} s"

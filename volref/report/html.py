@@ -132,6 +132,7 @@ def _picture(scene: Scene, out: Render, alt: str) -> str:
 
 def _figures(numbers: Figures, more: Sequence[Row]) -> str:
     kind, meaning = KINDS[numbers.error_kind]
+    work = "piece" if numbers.method == "exact" else "sample"
     rows: list[Row] = []
     if numbers.error_kind != "none":
         rows += [
@@ -143,10 +144,10 @@ def _figures(numbers: Figures, more: Sequence[Row]) -> str:
     rows += [
         ("rendering", f"{numbers.seconds:.2f} s"),
         ("threads", str(numbers.threads)),
-        ("samples", f"{numbers.samples:,}"),
+        (f"{work}s", f"{numbers.samples:,}"),
     ]
     if numbers.ns_per_sample is not None:
-        rows.append(("wall time per sample", f"{numbers.ns_per_sample:.0f} ns"))
+        rows.append((f"wall time per {work}", f"{numbers.ns_per_sample:.0f} ns"))
     tiles = "".join(
         f"<div><dt>{escape(name)}</dt><dd>{escape(value)}</dd></div>" for name, value in [*rows, *more]
     )
@@ -203,6 +204,9 @@ def _plan(plan: Plan, unit: str) -> str:
     how = f"Method {plan.method}"
     if plan.step:
         how += f": a sample every {plan.step:g} {unit}, at most {plan.most_segments} on a ray"
+    elif plan.method == "exact" and plan.includes("volume"):
+        how += ": rays are cut into pieces where they pass from voxel to voxel, and further only where the "
+        how += "tolerance asks for it; there is no step"
     left_out = [stage.name for stage in plan.stages if not stage.included]
     saving = [stage.name for stage in plan.stages if stage.included and stage.name in SHORTCUTS]
     told = f"Stages left out: {', '.join(left_out) or 'none'}. "
