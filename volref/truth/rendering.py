@@ -1,5 +1,6 @@
 """`render`: a scene in, an image with its error and its cost out."""
 
+import dataclasses
 import os
 import queue
 import time
@@ -11,11 +12,12 @@ import numpy as np
 from volref import planning
 from volref.arrays import Floats, Indices, number, whole_number
 from volref.errors import SceneError
-from volref.planning import HALF_LEVEL, RAYS_PER_CHUNK, Plan
+from volref.planning import HALF_LEVEL, RAYS_PER_CHUNK, Plan, Stage
 from volref.records import Surface
 from volref.scene.scene import Scene
-from volref.truth.exact import integrate_pixels, prepare
-from volref.truth.march import field_of, march_chunk
+from volref.truth.choosing import Choice, around_each, choose
+from volref.truth.exact import Prepared, integrate_pixels, prepare
+from volref.truth.march import Field, field_of, march_chunk
 from volref.truth.result import Render
 from volref.truth.surfaces import visible_surface
 from volref.workspace import Workspace
@@ -81,10 +83,9 @@ def render(
     canvas = _Canvas(scene, surface, workers, progress, deadline)
     if decided.method == "march":
         kind = "estimate"
-        canvas.draw(_marcher(scene, decided, canvas), _runs(scene))
+        canvas.draw(_marcher(scene, decided, field_of(scene) if decided.includes("volume") else None, canvas), _runs(scene))
     else:
-        kind = "certified"
-        _draw_exactly(scene, decided, canvas)
+        kind, decided = _draw_to_tolerance(scene, decided, canvas)
     shape = scene.height, scene.width
     return Render(
         canvas.rgba.reshape(*shape, 4),
@@ -148,9 +149,7 @@ def _anything(scene: Scene, behind: Floats) -> tuple[Floats, Floats]:
     return (most + least) / 2, (most - least).max(axis=1) / 2
 
 
-def _marcher(scene: Scene, plan: Plan, canvas: _Canvas) -> Integrator:
-    field = field_of(scene) if plan.includes("volume") else None
-
+def _marcher(scene: Scene, plan: Plan, field: Field | None, canvas: _Canvas) -> Integrator:
     def march(part: Indices, work: Workspace) -> tuple[Floats, Floats, int]:
         chunk = march_chunk(scene, plan, field, part, canvas.distance[part], canvas.behind(part), work)
         return chunk.rgba, chunk.bound, chunk.samples
@@ -158,24 +157,51 @@ def _marcher(scene: Scene, plan: Plan, canvas: _Canvas) -> Integrator:
     return march
 
 
-def _draw_exactly(scene: Scene, plan: Plan, canvas: _Canvas) -> None:
-    """Integrate every pixel to the plan's tolerance; against a deadline, all of them roughly first."""
+def _draw_to_tolerance(scene: Scene, plan: Plan, canvas: _Canvas) -> tuple[str, Plan]:
+    """Draw by the exact method, or, if the plan leaves the choice, by the cheaper one; return kind and plan."""
     prepared = prepare(scene, plan) if plan.includes("volume") else None
+    if plan.method == "auto" and prepared is not None:
+        behind = canvas.behind(np.arange(len(canvas.distance)))
+        field = field_of(scene)
+        choice = choose(scene, plan, field, prepared, canvas.distance, behind)
+        if choice is not None:
+            return "estimate", _march_then_mend(scene, choice, field, prepared, canvas)
+    _draw_exactly(scene, plan.tolerance, prepared, canvas)
+    return "certified", dataclasses.replace(plan, method="exact")
 
-    def to(tolerance: float) -> Integrator:
-        def integrate(part: Indices, _: Workspace) -> tuple[Floats, Floats, int]:
-            done = integrate_pixels(
-                scene, prepared, part, canvas.distance[part], canvas.behind(part), tolerance
-            )
-            return done.rgba, done.bound, done.pieces
 
-        return integrate
+def _march_then_mend(
+    scene: Scene, choice: Choice, field: Field, prepared: Prepared, canvas: _Canvas
+) -> Plan:
+    """March, scale the estimates, and integrate exactly the pixels whose estimate exceeds the tolerance."""
+    plan, shape = choice.plan, (scene.height, scene.width)
+    canvas.draw(_marcher(scene, plan, field, canvas), _runs(scene))
+    canvas.bound[:] = choice.factor * around_each(canvas.bound.reshape(shape)).reshape(-1) + plan.termination
+    left = np.flatnonzero(canvas.bound > plan.tolerance)
+    tile = TILE_WIDTH * TILE_HEIGHT
+    parts = [left[first : first + tile] for first in range(0, len(left), tile)]
+    canvas.draw(_integrator(scene, plan.tolerance, prepared, canvas), parts)
+    reason = f"marched, its estimates scaled by {choice.factor:.3g} after tiles integrated exactly; "
+    reason += f"{len(left)} pixels above the tolerance integrated exactly"
+    return dataclasses.replace(plan, stages=(*plan.stages, Stage("method", included=True, reason=reason)))
 
+
+def _integrator(scene: Scene, tolerance: float, prepared: Prepared | None, canvas: _Canvas) -> Integrator:
+    def integrate(part: Indices, _: Workspace) -> tuple[Floats, Floats, int]:
+        distance, behind = canvas.distance[part], canvas.behind(part)
+        done = integrate_pixels(scene, prepared, part, distance, behind, tolerance)
+        return done.rgba, done.bound, done.pieces
+
+    return integrate
+
+
+def _draw_exactly(scene: Scene, tolerance: float, prepared: Prepared | None, canvas: _Canvas) -> None:
+    """Integrate every pixel to the tolerance; against a deadline, all of them roughly first."""
     parts = _tiles(scene)
     if canvas.deadline < np.inf:
-        canvas.draw(to(np.inf), parts)
-        parts = [part for part in parts if canvas.bound[part].max() > plan.tolerance]
-    canvas.draw(to(plan.tolerance), parts)
+        canvas.draw(_integrator(scene, np.inf, prepared, canvas), parts)
+        parts = [part for part in parts if canvas.bound[part].max() > tolerance]
+    canvas.draw(_integrator(scene, tolerance, prepared, canvas), parts)
 
 
 def _runs(scene: Scene) -> list[Indices]:

@@ -1,0 +1,127 @@
+"""Which method is cheapest where an estimate may do: measured on a few tiles of the image.
+
+The marcher's error is known only where the truth is.  So some tiles are integrated exactly and marched, which
+tells how its estimate relates to its error in this scene, which step meets the tolerance, how many pixels will
+have to be integrated exactly all the same, and what either costs.
+"""
+
+import time
+from dataclasses import dataclass
+
+import numpy as np
+
+from volref import planning
+from volref.arrays import Floats, Indices
+from volref.planning import MOST_DEFAULT_SEGMENTS, Plan
+from volref.scene.scene import Scene
+from volref.truth.exact import Prepared, integrate_pixels
+from volref.truth.march import Field, march_chunk
+from volref.workspace import Workspace
+
+# Tiles to try, pixels on a side, and at most this share of the image.
+TILES, SIDE, MOST_SHARE = 24, 8, 1 / 8
+
+# The estimate is scaled so that it holds for this share of the pixels tried, with this margin.
+HELD, MARGIN = 0.999, 2.0
+
+# The first step tried, in units of the least spacing, and the range of those that may follow from it.
+FIRST_STEP, LEAST_STEP, MOST_STEP = 1.0, 0.05, 4.0
+
+# The truth on the tiles is known to this part of the tolerance.
+TRUER = 1e-2
+
+# The step is aimed at so that this share of the pixels is left to be integrated exactly.
+MOST_LEFT = 0.01
+
+# Where its leading term rules, the estimate is 8 times the error.  One that would have to be scaled up by more than
+# this has missed what matters, and may have missed more beside the tiles.
+LEAST_FACTOR, MOST_FACTOR = 1 / 8, 1.5
+
+# Marching has to be predicted to take less than this part of the time: prediction is rough.
+WORTH = 0.7
+
+
+@dataclass(frozen=True, eq=False)
+class Choice:
+    """March with `plan`, and take `factor` times the greatest estimate around a pixel as its bound."""
+
+    plan: Plan
+    factor: float
+
+
+@dataclass(frozen=True, eq=False)
+class _Tried:
+    """A step on the pixels tried: the factor of its estimates, seconds per pixel in all, and a typical bound."""
+
+    plan: Plan
+    factor: float
+    seconds: float
+    typical: float
+
+
+def choose(
+    scene: Scene, plan: Plan, field: Field, prepared: Prepared, distance: Floats, behind: Floats
+) -> Choice | None:
+    """Return how to march `scene` to `plan.tolerance`, or None where integrating exactly is cheaper.
+
+    distance (H W,) and behind (H W, 4) are those of all pixels.
+    """
+    tiles = _tiles(scene)
+    if len(tiles) == 0:
+        return None
+    pixels = tiles.ravel()
+    on_tiles = distance[pixels], behind[pixels]
+    truth = integrate_pixels(scene, prepared, pixels, *on_tiles, max(plan.tolerance * TRUER, 1e-12))
+    started = time.perf_counter()
+    integrate_pixels(scene, prepared, pixels, *on_tiles, plan.tolerance)
+    exactly = (time.perf_counter() - started) / len(pixels)
+    busy = max(float((truth.bound > 0).mean()), 1e-3)  # pixels that cost nothing are never left
+
+    def tried(step: float) -> _Tried | None:
+        marching = planning.plan(scene, method="march", step=step, tolerance=plan.tolerance)
+        if marching.most_segments > MOST_DEFAULT_SEGMENTS:
+            return None
+        started = time.perf_counter()
+        chunk = march_chunk(scene, marching, field, pixels, *on_tiles, Workspace())
+        seconds = (time.perf_counter() - started) / len(pixels)
+        error = np.abs(chunk.rgba - truth.rgba).max(axis=1)
+        around = around_each(chunk.bound.reshape(tiles.shape)).ravel()
+        ratio = np.quantile(error / np.maximum(around, 1e-300), HELD)
+        factor = max(float(MARGIN * ratio), LEAST_FACTOR)
+        if factor > MOST_FACTOR:
+            return None
+        left = float((factor * around > plan.tolerance).mean())
+        typical = float(np.quantile(factor * around, 1 - MOST_LEFT))
+        return _Tried(marching, factor, seconds + min(left / busy, 1.0) * exactly, typical)
+
+    assert scene.volume is not None
+    voxel = min(scene.volume.spacing)
+    best = tried(FIRST_STEP * voxel)
+    if best is None:
+        return None
+    # The error goes with the square of the step.
+    wanted = FIRST_STEP * np.sqrt(plan.tolerance / max(best.typical, 1e-300))
+    again = tried(float(np.clip(wanted, LEAST_STEP, MOST_STEP)) * voxel)
+    if again is not None and again.seconds < best.seconds:
+        best = again
+    return Choice(best.plan, best.factor) if best.seconds < WORTH * exactly else None
+
+
+def around_each(estimate: Floats) -> Floats:
+    """Return the greatest estimate of each pixel and its eight neighbours, of images (..., H, W)."""
+    from scipy.ndimage import maximum_filter
+
+    size = (1,) * (estimate.ndim - 2) + (3, 3)
+    return np.asarray(maximum_filter(estimate, size, mode="nearest"))
+
+
+def _tiles(scene: Scene) -> Indices:
+    """Return the pixels (k, SIDE, SIDE) of tiles spread over the image."""
+    across, down = scene.width // SIDE, scene.height // SIDE
+    count = min(TILES, int(across * down * MOST_SHARE))
+    if count == 0:
+        return np.empty((0, SIDE, SIDE), np.intp)
+    chosen = np.random.default_rng(0).choice(across * down, count, replace=False)
+    y, x = np.divmod(chosen, across)
+    corner = (y * SIDE) * scene.width + x * SIDE
+    return np.asarray(corner[:, None, None] + np.arange(SIDE)[:, None] * scene.width + np.arange(SIDE))
