@@ -52,7 +52,7 @@ def calibration(samples: int) -> float:
 def main() -> None:
     """Measure and print."""
     scene = bench_scene(int(sys.argv[1]) if len(sys.argv) > 1 else 128)
-    plan = vr.plan(scene)
+    plan = vr.plan(scene, method="march")
     nominal = vr.render(scene, plan=plan.everything(), threads=1).samples
     unit = calibration(nominal)
     print(plan)
