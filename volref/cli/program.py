@@ -12,7 +12,7 @@ import sys
 from collections.abc import Sequence
 from typing import NoReturn
 
-from volref.cli import compare, convert, demo, info, plan, render, report, stability, trace
+from volref.cli import compare, convert, demo, info, plan, precision, render, report, stability, trace
 from volref.cli.output import refuse
 from volref.cli.verb import BAD_USE, GOOD, example_lines
 from volref.errors import FormatError, SceneError
@@ -25,6 +25,7 @@ VERBS = (
     compare.VERB,
     info.VERB,
     convert.VERB,
+    precision.VERB,
     stability.VERB,
     report.VERB,
 )
