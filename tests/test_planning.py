@@ -1,4 +1,5 @@
 import dataclasses
+import functools
 import json
 
 import numpy as np
@@ -6,6 +7,10 @@ import pytest
 
 import volref as vr
 from tests.scenes import camera_towards, colorful_transfer, rough_scene, sparse_scene
+from volref.phantoms.meshes import box_mesh
+
+march_plan = functools.partial(vr.plan, method="march")
+exact_plan = functools.partial(vr.plan, method="exact")
 
 
 def stage(plan, name):
@@ -13,7 +18,7 @@ def stage(plan, name):
 
 
 def test_every_stage_says_in_or_out_and_why():
-    plan = vr.plan(rough_scene())
+    plan = march_plan(rough_scene())
     assert [s.name for s in plan.stages] == [
         "meshes",
         "volume",
@@ -26,47 +31,99 @@ def test_every_stage_says_in_or_out_and_why():
     assert json.loads(json.dumps(plan.as_dict()))["stages"][0]["included"] is False
 
 
+def test_every_stage_of_the_exact_method_says_in_or_out_and_why():
+    plan = exact_plan(rough_scene())
+    assert [s.name for s in plan.stages] == ["meshes", "volume", "empty space", "background"]
+    assert all(s.reason for s in plan.stages)
+    assert str(plan).startswith("method exact\n")
+    assert json.loads(json.dumps(plan.as_dict()))["method"] == "exact"
+
+
+def test_the_exact_method_has_no_step_and_ends_no_ray_early():
+    plan = exact_plan(rough_scene())
+    assert (plan.step, plan.most_segments, plan.termination) == (0.0, 0, 0.0)
+    for more in ({"method": "exact"}, {"method": "auto"}):
+        with pytest.raises(vr.SceneError, match=r"step must be left out unless method is 'march', got 0.3"):
+            vr.plan(rough_scene(), step=0.3, **more)
+
+
+def test_auto_is_exact_unless_an_estimate_may_do():
+    scene = rough_scene()
+    assert vr.plan(scene, method="auto").method == "exact"
+    assert vr.plan(scene, method="auto").stages == exact_plan(scene).stages
+    assert vr.plan(scene, method="auto", certified=False).method == "auto"
+    # Who names a method has chosen.
+    assert march_plan(scene, certified=True).method == "march"
+    assert exact_plan(scene, certified=False).method == "exact"
+
+
+def test_the_exact_method_leaves_out_what_the_scene_does_not_need():
+    scene = rough_scene()
+    clear = dataclasses.replace(scene, transfer=vr.TransferFunction([0], [(1, 1, 1)], [0]))
+    plan = exact_plan(clear)
+    assert [s.name for s in plan.stages if s.included] == []
+    assert plan.everything().includes("volume")
+    bare = dataclasses.replace(scene, volume=None, transfer=None, meshes=[box_mesh((1, 1, 1))])
+    assert stage(exact_plan(bare), "volume").reason == "the scene has none"
+    assert not exact_plan(bare).everything().includes("volume")
+
+
+def test_everything_of_the_exact_method_is_the_same_image():
+    scenes = [rough_scene(), sparse_scene(), rough_scene(spacing=(1.0, 0.7, 1.3), centering="node")]
+    for scene in scenes:
+        planned, forced = exact_plan(scene, tolerance=1e-6), exact_plan(scene, tolerance=1e-6).everything()
+        assert planned.includes("empty space")
+        assert not forced.includes("empty space")
+        first, second = vr.render(scene, plan=planned), vr.render(scene, plan=forced)
+        assert (np.abs(first.rgba - second.rgba).max(axis=-1) <= first.bound + second.bound).all()
+        assert second.plan.stages == forced.stages
+        assert (first.bound_kind, second.bound_kind) == ("certified", "certified")
+        assert first.met_tolerance
+        assert second.met_tolerance
+
+
 def test_the_default_step_is_half_the_least_spacing():
-    assert vr.plan(rough_scene(spacing=(1.0, 0.5, 3.0))).step == 0.25
+    assert march_plan(rough_scene(spacing=(1.0, 0.5, 3.0))).step == 0.25
 
 
 def test_a_volume_that_nothing_shows_is_left_out():
-    plan = vr.plan(rough_scene(transfer=vr.TransferFunction([2, 3], [(1, 1, 1)] * 2, [0, 1])))
+    plan = march_plan(rough_scene(transfer=vr.TransferFunction([2, 3], [(1, 1, 1)] * 2, [0, 1])))
     assert not plan.includes("volume")
     assert stage(plan, "volume").reason.startswith("opacity 0 for every value from 0.0")
 
 
 def test_an_optical_depth_that_cannot_end_a_ray_leaves_early_termination_out():
     faint = rough_scene(transfer=colorful_transfer(extinction=0.1))
-    assert stage(vr.plan(faint), "early termination").reason.startswith(
+    assert stage(march_plan(faint), "early termination").reason.startswith(
         "the optical depth of a ray cannot exceed"
     )
-    assert vr.plan(rough_scene(transfer=colorful_transfer(extinction=9.0))).includes("early termination")
+    assert march_plan(rough_scene(transfer=colorful_transfer(extinction=9.0))).includes("early termination")
 
 
 def test_only_knots_that_the_volume_reaches_count_for_early_termination():
     # 50 is far above the values, which end at 1; between 1 and 50 the extinction has risen by 1/49 of 1e3.
     transfer = vr.TransferFunction([0, 1, 50], [(1, 1, 1)] * 3, [0, 0.01, 1e3])
-    assert not vr.plan(rough_scene(transfer=transfer)).includes("early termination")
+    assert not march_plan(rough_scene(transfer=transfer)).includes("early termination")
 
 
 def test_a_sparse_volume_has_empty_space_and_a_full_one_has_none():
-    assert vr.plan(sparse_scene()).includes("empty space")
-    assert not vr.plan(rough_scene(transfer=colorful_transfer(0.01))).includes("empty space")
+    assert march_plan(sparse_scene()).includes("empty space")
+    assert not march_plan(rough_scene(transfer=colorful_transfer(0.01))).includes("empty space")
 
 
 def test_everything_forces_all_that_was_left_out():
     scene = rough_scene()
-    everything = vr.plan(scene).everything()
+    everything = march_plan(scene).everything()
     assert everything.occupancy is None
     assert everything.termination == 0.0
     assert [s.name for s in everything.stages if s.included] == ["volume"]
-    np.testing.assert_array_equal(vr.render(scene, plan=everything).rgba, vr.render(scene).rgba)
+    expected = vr.render(scene, method="march")
+    np.testing.assert_array_equal(vr.render(scene, plan=everything).rgba, expected.rgba)
 
 
 def test_a_plan_with_another_step_is_followed_and_skips_only_what_it_may():
     scene = sparse_scene()
-    plan = vr.plan(scene)
+    plan = march_plan(scene)
     for factor in (0.5, 2.0, 8.0):
         changed = dataclasses.replace(plan, step=plan.step * factor, termination=0.0)
         out = vr.render(scene, plan=changed)
@@ -76,7 +133,7 @@ def test_a_plan_with_another_step_is_followed_and_skips_only_what_it_may():
 @pytest.mark.parametrize("step", [0, -1, np.nan, np.inf, "a"])
 def test_a_step_that_is_no_length_is_refused(step):
     with pytest.raises(vr.SceneError, match="step must be"):
-        vr.plan(rough_scene(), step=step)
+        march_plan(rough_scene(), step=step)
 
 
 def test_an_unknown_method_is_refused():
@@ -87,16 +144,16 @@ def test_an_unknown_method_is_refused():
 @pytest.mark.parametrize("step", [1e-310, 1e-300, 1e-9])
 def test_a_step_that_would_never_end_is_refused(step):
     with pytest.raises(vr.SceneError, match="step must take at most 2147483648 samples"):
-        vr.plan(rough_scene(), step=step)
+        march_plan(rough_scene(), step=step)
 
 
 def test_what_the_scene_does_not_have_cannot_be_forced_in():
     scene = rough_scene()
-    assert not vr.plan(scene).everything().includes("meshes")
+    assert not march_plan(scene).everything().includes("meshes")
     clear = dataclasses.replace(scene, transfer=vr.TransferFunction([0], [(1, 1, 1)], [0]))
-    assert not vr.plan(clear).includes("volume")
-    assert vr.plan(clear).everything().includes("volume")
-    assert vr.render(clear, plan=vr.plan(clear).everything()).samples > 0
+    assert not march_plan(clear).includes("volume")
+    assert march_plan(clear).everything().includes("volume")
+    assert vr.render(clear, plan=march_plan(clear).everything()).samples > 0
 
 
 def test_a_range_that_ends_at_the_foot_of_a_ramp_counts_as_seen_since_rounding_may_pass_it():
@@ -105,8 +162,8 @@ def test_a_range_that_ends_at_the_foot_of_a_ramp_counts_as_seen_since_rounding_m
     values[:, :, :4] = 0.3
     volume = vr.Volume(values)
     scene = vr.Scene(volume, transfer, camera_towards(volume), 4, 4)
-    plan = vr.plan(scene)
+    plan = march_plan(scene)
     assert plan.includes("volume")
     assert plan.occupancy.blocks.any()
     flat = vr.Volume(np.full((8, 8, 32), 0.3))  # one value is interpolated without rounding
-    assert not vr.plan(vr.Scene(flat, transfer, camera_towards(flat), 4, 4)).includes("volume")
+    assert not march_plan(vr.Scene(flat, transfer, camera_towards(flat), 4, 4)).includes("volume")

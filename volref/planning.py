@@ -165,7 +165,7 @@ METHODS = ("auto", "march", "exact")
 def plan(
     scene: Scene,
     *,
-    method: str = "march",
+    method: str = "auto",
     step: float | None = None,
     tolerance: float = HALF_LEVEL,
     certified: bool = True,

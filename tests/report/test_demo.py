@@ -12,12 +12,14 @@ import volref as vr
 from tests.report.pages import Page
 from volref.errors import FormatError, SceneError
 from volref.image import decode_rgba8, encode_rgba8
-from volref.planning import TERMINATION
-from volref.report.demo import DATA, FILES, REPEAT_PYTHON, STEP_MM, demo_scene, run_demo
+from volref.report.demo import DATA, FILES, REPEAT_PYTHON, demo_scene, run_demo
 from volref.report.pictures import NEUTRAL
 from volref.truth.surfaces import visible_surface
 
 SIDE = 48
+
+# A short step in mm, a sixth of the default.
+FINE = 1 / 12
 
 # Pixels (x, y) of the small image: on the bare surface above the volume, on the surface within it, in the
 # volume beside the surface, and beside everything.
@@ -42,6 +44,11 @@ def rgba(found):
 @pytest.fixture(scope="module")
 def scene():
     return demo_scene(SIDE, SIDE)
+
+
+@pytest.fixture(scope="module")
+def out(scene):
+    return vr.render(scene, threads=2)
 
 
 def at(array, pixel):
@@ -125,8 +132,7 @@ def test_the_png_is_the_array_in_srgb(folder, rgba):
     np.testing.assert_allclose(decode_rgba8(codes), rgba, rtol=0, atol=0.5 / 255 / 0.43)
 
 
-def test_the_figures_are_those_of_the_image(scene, found, rgba):
-    out = vr.render(scene, step=STEP_MM, threads=2)
+def test_the_figures_are_those_of_the_image(out, found, rgba):
     np.testing.assert_array_equal(out.rgba, rgba)
     assert found["error_max"] == out.bound.max()
     assert found["met_tolerance"] == out.met_tolerance
@@ -135,23 +141,24 @@ def test_the_figures_are_those_of_the_image(scene, found, rgba):
     assert 0 < found["seconds"] < found["seconds_in_all"]
 
 
-def test_the_error_of_the_demo_is_estimated_below_half_a_level(found):
-    assert found["error_kind"] == "estimate"
+def test_the_error_of_the_demo_is_certified_below_half_a_level(found):
+    assert (found["error_kind"], found["method"]) == ("certified", "exact")
     assert found["met_tolerance"]
     assert found["error_max"] <= 0.5 / 255
 
 
 @pytest.mark.parametrize("pixel", [BARE, INSIDE, GLASS, OUTSIDE, (12, 30), (36, 20), (40, 26), (7, 20)])
-def test_a_pixel_of_the_image_is_the_sum_along_its_ray(scene, rgba, pixel):
-    traced = vr.trace(scene, pixel, step=STEP_MM)
-    # The light behind an early end, and one rounding for each of at most a few thousand segments.
-    atol = TERMINATION + 4000 * np.finfo(np.float64).eps
-    np.testing.assert_allclose(at(rgba, pixel), traced.head["rgba"], rtol=0, atol=atol)
+def test_a_pixel_of_the_image_is_the_sum_along_its_ray(scene, out, rgba, pixel):
+    fine, coarse = (np.array(vr.trace(scene, pixel, step=step).head["rgba"]) for step in (FINE, 3 * FINE))
+    # The certificate; the sum's own error, an eighth of what a third of the step changes; and a rounding for
+    # each of at most a few thousand segments.
+    atol = at(out.bound, pixel) + np.abs(fine - coarse).max() + 4000 * np.finfo(np.float64).eps
+    np.testing.assert_allclose(at(rgba, pixel), fine, rtol=0, atol=atol)
 
 
 @pytest.mark.parametrize("pixel", [BARE, INSIDE, GLASS, OUTSIDE])
 def test_the_surface_is_where_the_ray_first_meets_a_triangle(scene, pixel):
-    traced = vr.trace(scene, pixel, step=STEP_MM)
+    traced = vr.trace(scene, pixel)
     mesh = scene.meshes[0]
     expected = nearest_hit(mesh, np.array(traced.head["origin"]), np.array(traced.head["direction"]))
     found = at(visible_surface(scene).distance, pixel)
@@ -161,7 +168,7 @@ def test_the_surface_is_where_the_ray_first_meets_a_triangle(scene, pixel):
 
 
 def test_the_surface_is_bare_above_the_volume_and_veiled_within(scene, rgba):
-    bare, inside = (vr.trace(scene, pixel, step=STEP_MM) for pixel in (BARE, INSIDE))
+    bare, inside = (vr.trace(scene, pixel) for pixel in (BARE, INSIDE))
     np.testing.assert_array_equal(at(rgba, BARE)[:3], bare.head["surface"]["color"])
     top = scene.volume.origin[2] + scene.volume.size[2] - 0.5
     surface = np.array(bare.head["origin"]) + bare.head["surface"]["distance"] * np.array(
@@ -174,7 +181,7 @@ def test_the_surface_is_bare_above_the_volume_and_veiled_within(scene, rgba):
 
 
 def test_the_surface_shows_through_the_volume(scene, rgba):
-    without = vr.render(dataclasses.replace(scene, meshes=()), step=STEP_MM, threads=1)
+    without = vr.render(dataclasses.replace(scene, meshes=()), threads=1)
     seen = np.abs(without.rgba - rgba).max(axis=-1) > 10 / 255
     veiled = seen & (np.abs(without.rgba[..., :3] - scene.background[:3]).max(axis=-1) > 10 / 255)
     assert veiled.mean() > 0.15  # of the image's pixels: the part of the surface that lies in the volume

@@ -21,10 +21,6 @@ from volref.truth.result import Render
 
 DATA = Path(__file__).parent.parent / "demo_data"
 
-# The error falls with the square of the step: at 512 x 512 pixels its estimate is at most 14 levels of 1/255
-# for the default step of 0.5 mm, and 0.4 for this one, which is below half a level.
-STEP_MM = 0.08
-
 FILES = ("demo.png", "demo.npy", "demo.html", "depth.png", "error.png")
 
 TITLE = "A head and its white matter"
@@ -40,12 +36,12 @@ ALT = (
 )
 REPEAT_PYTHON = """\
 import volref as vr
-from volref.report.demo import STEP_MM, demo_scene
+from volref.report.demo import demo_scene
 
 scene = demo_scene(width={width}, height={height})
-out = vr.render(scene, step=STEP_MM)
-print(out.rgba.shape, out.bound.max() * 255, out.seconds)
-print(vr.trace(scene, ({x}, {y}), step=STEP_MM))
+out = vr.render(scene)
+print(out.rgba.shape, out.bound.max() * 255, out.bound_kind, out.seconds)
+print(vr.trace(scene, ({x}, {y})))
 """
 
 
@@ -76,6 +72,7 @@ def run_demo(
 
     demo.png is the image for people (sRGB), demo.npy the same as float64 premultiplied RGBA (height, width,
     4) in the working space, depth.png and error.png are maps with a scale, and demo.html shows them all.
+    The error is certified.
 
     Parameters
     ----------
@@ -97,7 +94,7 @@ def run_demo(
     paths = _free_paths(Path(folder), overwrite=overwrite)
     scene = demo_scene(width, height)
     loaded = time.perf_counter() - started
-    out = render(scene, step=STEP_MM, threads=threads, progress=progress)
+    out = render(scene, threads=threads, progress=progress)
     _make_folder(Path(folder))
     write_png(paths["demo.png"], encode_rgba8(out.rgba), overwrite=overwrite)
     write_npy(paths["demo.npy"], out.rgba, overwrite=overwrite)

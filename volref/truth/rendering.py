@@ -35,7 +35,7 @@ Integrator = Callable[[Indices, Workspace], tuple[Floats, Floats, int]]
 def render(
     scene: Scene,
     *,
-    method: str = "march",
+    method: str = "auto",
     tolerance: float = HALF_LEVEL,
     certified: bool = True,
     step: float | None = None,
