@@ -11,6 +11,7 @@ import volref.studies.orders as orders
 import volref.studies.precision.run as running
 from volref.cli import main
 from volref.cli.verb import DIFFERS
+from volref.report import plots
 from volref.studies.orders import Observation
 from volref.studies.precision import METHODS, SUITES, frontier, run_precision
 from volref.studies.precision.points import SceneStudy
@@ -104,14 +105,15 @@ def test_files_are_written_and_named(scene_file, tmp_path, capsys):
     assert run(capsys, *words, "-q", "--force") == (0, "", "")
 
 
-def test_a_plot_is_named_as_seen_from_the_page(scene_file, tmp_path, capsys):
+def test_a_plot_is_named_as_seen_from_the_page(scene_file, tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(plots, "save_precision_plot", lambda study, path, **_: path.write_text(study.name))
     for folder in ("pages", "images"):
         (tmp_path / folder).mkdir()
     page, plot = tmp_path / "pages" / "p.md", tmp_path / "images" / "p.svg"
     run(capsys, scene_file, "--suite", "few-kinks", *QUICK, "--markdown", page, "--plot", plot)
     for name in ("scene", "few-kinks"):
         assert f"](../images/p-{name}.svg)" in page.read_text()
-        assert (tmp_path / "images" / f"p-{name}.svg").exists()
+        assert (tmp_path / "images" / f"p-{name}.svg").read_text() == name
 
 
 @pytest.mark.usefixtures("unmeasured")

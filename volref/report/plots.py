@@ -35,7 +35,7 @@ STYLES = {
     "volref march": ("#0072B2", "o"),
     "volref, certified": ("#000000", "D"),
     "volref, estimated": ("#D55E00", "X"),
-    "Riemann sums, trapezoid": ("#8A8A8A", "s"),
+    "Riemann or trapezoid": ("#8A8A8A", "s"),
     "opacity-corrected": ("#56B4E9", "v"),
     "pre-integrated": ("#E69F00", "^"),
     "Gauss in each cell": ("#009E73", "P"),
@@ -53,8 +53,8 @@ LABEL_SIZE = 8
 GREY, INK = "#9AA0A6", "#202124"
 
 
-class Run(NamedTuple):
-    """Neighbours on the frontier that are of one family."""
+class Share(NamedTuple):
+    """A family's part of the frontier."""
 
     family: str
     points: tuple[Point, ...]
@@ -69,16 +69,10 @@ class Run(NamedTuple):
         return f"{self.family}, {coarse}" + (f" to {fine.removeprefix('step ')}" if fine != coarse else "")
 
 
-def runs_of(points: Sequence[Point]) -> list[Run]:
-    """Return a frontier as runs of one family each."""
-    runs: list[Run] = []
-    for point in points:
-        family = BY_NAME[point.method].family
-        if runs and runs[-1].family == family:
-            runs[-1] = Run(family, (*runs[-1].points, point))
-        else:
-            runs.append(Run(family, (point,)))
-    return runs
+def shares_of(points: Sequence[Point]) -> list[Share]:
+    """Return a frontier family by family, so that each needs one label however often they take turns."""
+    families = dict.fromkeys(BY_NAME[point.method].family for point in points)
+    return [Share(f, tuple(p for p in points if BY_NAME[p.method].family == f)) for f in families]
 
 
 def plot_paths(path: str | Path, names: Sequence[str]) -> dict[str, Path]:
@@ -202,7 +196,7 @@ def height(point: Point, measure: str) -> float:
 
 
 def place_labels(axes: "Axes", points: Sequence[Point], measure: str) -> list["Annotation"]:
-    """Name the runs of the frontier of `points`, each where it covers no other name and few marks.
+    """Name the families on the frontier of `points`, each where it covers no other name and few marks.
 
     Returns the labels that found a place inside the panel; what finds none is left out.
     """
@@ -211,10 +205,10 @@ def place_labels(axes: "Axes", points: Sequence[Point], measure: str) -> list["A
     taken = [text.get_window_extent() for text in axes.texts]
     points_per_pixel = 72 / axes.figure.dpi
     labels = []
-    for run in sorted(runs_of(frontier(points, measure)), key=lambda run: -len(run.points)):
-        point = run.points[len(run.points) // 2]
+    for share in shares_of(frontier(points, measure)):
+        point = share.points[len(share.points) // 2]
         anchor = point.seconds, height(point, measure)
-        probe = axes.text(*anchor, run.label, ha="center", va="center", fontsize=LABEL_SIZE)
+        probe = axes.text(*anchor, share.label, ha="center", va="center", fontsize=LABEL_SIZE)
         box = probe.get_window_extent().padded(3)
         probe.remove()
         place = free_place(box, frame, taken, marks)
@@ -223,10 +217,11 @@ def place_labels(axes: "Axes", points: Sequence[Point], measure: str) -> list["A
         taken.append(box.translated(*place))
         labels.append(
             axes.annotate(
-                run.label, anchor, xytext=(place[0] * points_per_pixel, place[1] * points_per_pixel),
+                share.label, anchor, xytext=(place[0] * points_per_pixel, place[1] * points_per_pixel),
                 textcoords="offset points", ha="center", va="center",
                 fontsize=LABEL_SIZE, color=INK, zorder=6,
                 arrowprops={"arrowstyle": "-", "color": INK, "linewidth": 0.6, "shrinkA": 0, "shrinkB": 6},
+                bbox={"boxstyle": "square,pad=0.1", "facecolor": "white", "alpha": 0.8, "linewidth": 0},
             )
         )  # fmt: skip
     return labels

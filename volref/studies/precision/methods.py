@@ -28,9 +28,9 @@ STEPS = (4.0, 2.0, 1.0, 0.5, 0.25, 0.125, 0.0625)
 
 # Families by the first word of a rival's name; one line each in a plot.
 FAMILIES = {
-    "left-riemann": "Riemann sums, trapezoid",
-    "midpoint-riemann": "Riemann sums, trapezoid",
-    "trapezoid": "Riemann sums, trapezoid",
+    "left-riemann": "Riemann or trapezoid",
+    "midpoint-riemann": "Riemann or trapezoid",
+    "trapezoid": "Riemann or trapezoid",
     "left-exponential": "opacity-corrected",
     "midpoint-exponential": "opacity-corrected",
     "preintegrated": "pre-integrated",
