@@ -5,6 +5,8 @@ R rays.  Distances t are in world units along unit directions from the ray's ori
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from volref.arrays import Floats, Indices, Integers
 
 
@@ -47,10 +49,10 @@ class Pieces:
     ray (n,): index of the ray in its chunk, rising.
     length (n,): world length.
     cubic (4, n): the value along the piece is the sum of cubic[j] v^j, from v = -1/2 (near) to 1/2 (far).
-    slack (n,): how far the true value may be from that, but for the share `astray` (n,) of the piece, which may
-    lie in the next cell.
-    row (n,): the row of the models that holds on the piece, or -1 where it is yet to be found.
-    edge (n,): the share of the piece where the value is within `slack` of the ends of that row, if exact.
+    slack (n,): how far the true value may be from that, but for the share `astray` (n,) of the piece, which
+    may lie in the next cell. row (n,): the row of the models that holds on the piece, or -1 where it is yet
+    to be found. edge (n,): the share of the piece where the value is within `slack` of the ends of that row,
+    if exact.
     """
 
     ray: Indices
@@ -71,4 +73,28 @@ class Pieces:
             self.astray.take(chosen),
             self.row.take(chosen),
             self.edge.take(chosen),
+        )
+
+    def part(self, start: int, end: int) -> "Pieces":
+        """Return the pieces from `start` to `end`."""
+        return Pieces(
+            self.ray[start:end],
+            self.length[start:end],
+            self.cubic[:, start:end],
+            self.slack[start:end],
+            self.astray[start:end],
+            self.row[start:end],
+            self.edge[start:end],
+        )
+
+    def and_then(self, more: "Pieces") -> "Pieces":
+        """Return these pieces, and `more` after them."""
+        return Pieces(
+            np.append(self.ray, more.ray),
+            np.append(self.length, more.length),
+            np.concatenate([self.cubic, more.cubic], axis=1),
+            np.append(self.slack, more.slack),
+            np.append(self.astray, more.astray),
+            np.append(self.row, more.row),
+            np.append(self.edge, more.edge),
         )

@@ -23,11 +23,16 @@ CLOSE = 2.0**-47
 
 @dataclass(frozen=True, eq=False)
 class TablePieces:
-    """Linear pieces: breaks (n + 1,), left and right (4, n); knots closer than `blur` were taken for one."""
+    """Linear pieces: breaks (n + 1,), left and right (4, n).
+
+    Knots closer than `blur` were taken for one; hidden (4, n + 1) is by how much colours vary
+    among them, and their greatest strength.
+    """
 
     breaks: Floats
     left: Floats
     right: Floats
+    hidden: Floats
     blur: float = 0.0
 
 
@@ -46,8 +51,9 @@ def table_pieces(transfer: TransferFunction, low: float, high: float) -> TablePi
     knots, first = np.unique(transfer.values, return_index=True)
     last = np.append(first[1:], len(transfer.values)) - 1
     before, at = channels[:, first], channels[:, last]  # on both sides of a jump
-    knots, before, at, blur = _joined_where_close(knots, before, at, max(abs(low), abs(high)))
+    knots, before, at, hidden, blur = _joined_where_close(knots, before, at, max(abs(low), abs(high)))
     margin = max(high - low, abs(low), abs(high), 1.0)
+    low, high = low - blur, high + blur  # what was taken for one knot may lie on either side of it
     inside = np.flatnonzero((knots >= low) & (knots <= high))
     start = max(low - margin, *knots[knots < low][-1:], -np.inf)
     end = min(high + margin, *knots[knots > high][:1], np.inf)
@@ -55,7 +61,7 @@ def table_pieces(transfer: TransferFunction, low: float, high: float) -> TablePi
     outer = [_between(knots, before, at, start, below=False), _between(knots, before, at, end, below=True)]
     left = np.concatenate([outer[0][:, None], at[:, inside]], axis=1)
     right = np.concatenate([before[:, inside], outer[1][:, None]], axis=1)
-    return TablePieces(breaks, left, right, blur)
+    return TablePieces(breaks, left, right, np.pad(hidden[:, inside], [(0, 0), (1, 1)]), blur)
 
 
 def _between(knots: Floats, before: Floats, at: Floats, value: float, *, below: bool) -> Floats:
@@ -65,28 +71,36 @@ def _between(knots: Floats, before: Floats, at: Floats, value: float, *, below: 
         return before[:, 0]
     if k == len(knots):
         return at[:, -1]
-    share = (value - knots[k - 1]) / (knots[k] - knots[k - 1])
-    return np.asarray(at[:, k - 1] + share * (before[:, k] - at[:, k - 1]))
+    # From the nearer knot, so that a far one of great size does not cancel.
+    gap, rise = knots[k] - knots[k - 1], before[:, k] - at[:, k - 1]
+    if value - knots[k - 1] < knots[k] - value:
+        return np.asarray(at[:, k - 1] + (value - knots[k - 1]) / gap * rise)
+    return np.asarray(before[:, k] - (knots[k] - value) / gap * rise)
 
 
 def _joined_where_close(
     knots: Floats, before: Floats, at: Floats, size: float
-) -> tuple[Floats, Floats, Floats, float]:
+) -> tuple[Floats, Floats, Floats, Floats, float]:
     """Take neighbouring knots as one, with a jump, that values of `size` can hardly tell apart.
 
-    Returns the knots, the channels on both sides of each (4, k), and the greatest distance that was lost.
+    Returns the knots, the channels on both sides of each (4, k), by how much colours vary among those that
+    were taken for one, with their greatest strength (4, k), and the greatest distance that was lost.
     """
     gap = np.diff(knots)
     with np.errstate(over="ignore", divide="ignore"):
         steep = ~np.isfinite((before[:, 1:] - at[:, :-1]) / gap).all(axis=0)
     close = steep | (gap <= CLOSE * size)
     if not close.any():
-        return knots, before, at, 0.0
+        return knots, before, at, np.zeros(at.shape), 0.0
     begins = np.append(True, ~close)
     first = np.flatnonzero(begins)
     last = np.append(first[1:], len(knots)) - 1
     blur = float((knots[last] - knots[first]).max())
-    return knots[first], before[:, first], at[:, last], blur
+    most = np.maximum.reduceat(np.maximum(before, at), first, axis=1)
+    least = np.minimum.reduceat(np.minimum(before, at), first, axis=1)
+    most[:3] -= least[:3]
+    hidden = np.where(last > first, most, 0.0)
+    return knots[first], before[:, first], at[:, last], hidden, blur
 
 
 def without_straight_breaks(pieces: TablePieces) -> tuple[TablePieces, Floats]:
@@ -102,10 +116,12 @@ def without_straight_breaks(pieces: TablePieces) -> tuple[TablePieces, Floats]:
     bend = np.maximum(np.abs(right[:, :-1] - straight), np.abs(left[:, 1:] - straight))
     size = np.maximum.reduce([np.abs(left[:, :-1]), np.abs(right[:, :-1]), np.abs(right[:, 1:])])
     clear = (left[STRENGTH] == 0) & (right[STRENGTH] == 0)
-    kept = (bend > LEAST_BEND * size).any(axis=0) & ~(clear[:-1] & clear[1:])
+    hides = pieces.hidden[STRENGTH, 1:-1] > 0
+    kept = ((bend > LEAST_BEND * size).any(axis=0) & ~(clear[:-1] & clear[1:])) | hides
     first = np.flatnonzero(np.append(True, kept))
     last = np.append(first[1:], len(width)) - 1
-    merged = TablePieces(breaks[np.append(first, len(width))], left[:, first], right[:, last], pieces.blur)
+    ends = np.append(first, len(width))
+    merged = TablePieces(breaks[ends], left[:, first], right[:, last], pieces.hidden[:, ends], pieces.blur)
     return merged, _off_by(pieces, merged, first, clear)
 
 

@@ -23,8 +23,8 @@ from volref.records import Pieces, Spans
 # Unit roundoff of float64.
 ROUNDOFF = 2.0**-53
 
-# Roundings of the arithmetic of a cubic, of at most the differences of a cell's samples each: 3 of size 1 in the
-# first differences, 5 each in the second and 35 in the third, and 14 in putting them together.
+# Roundings of the arithmetic of a cubic, of at most the differences of a cell's samples each: 3 of size 1 in
+# the first differences, 5 each in the second and 35 in the third, and 14 in putting them together.
 ARITHMETIC = 70
 
 # Splits a float64 into two halves of 26 bits.
@@ -39,10 +39,9 @@ class CellGrid:
     """A padded grid as cells, and which of them can be seen.
 
     corners, strides: as in `sampling.Grid`.
-    seen: a flag for each block of 2^`shift` cells a side, (bz, by, bx), with one layer of blocks around; block 1
-    begins at padded index 1, the first sample of the volume.
-    near: the same for blocks of 2^`near_shift` cells, set where anything at most half a block away from it
-    along each axis can be seen.
+    seen: a flag for each block of 2^`shift` cells a side, (bz, by, bx), with one layer of blocks around;
+    block 1 begins at padded index 1, the first sample of the volume. near: the same for blocks of
+    2^`near_shift` cells, set where anything at most half a block away from it along each axis can be seen.
     """
 
     corners: tuple[Numbers, ...]
@@ -55,19 +54,20 @@ class CellGrid:
 
 
 def cells_along(
-    grid: CellGrid, origins: Floats, directions: Floats, spans: Spans, *, precise: bool
+    grid: CellGrid, origins: Floats, rests: Floats, directions: Floats, spans: Spans, *, precise: bool
 ) -> Pieces:
     """Return the pieces of rays (3, R) within `spans` whose cells can be seen.
 
     A piece of world length H about the padded position p has the value f(p + v H d), v from -1/2 to 1/2.
-    `precise` asks for a tight bound on its error, at some cost.
+    rests (3, R) is what rounding took off the origins.  `precise` asks for a tight bound on the error, at
+    some cost.
     """
     rays, t_near, t_far = _near_part(grid, origins, directions, spans)
     if len(rays) == 0:
         nothing = np.empty(0)
         return Pieces(rays, nothing, np.empty((4, 0)), nothing, nothing, rays, nothing)
     error = position_error(grid, origins, directions, spans)[rays]
-    origins, directions = origins[:, rays], directions[:, rays]
+    origins, directions, rests = origins[:, rays], directions[:, rays], rests[:, rays]
     ray, length, middle = _between_planes(origins, directions, t_near, t_far)
     direction = [d.take(ray) for d in directions]
     positions = [d * middle + o.take(ray) for o, d in zip(origins, direction, strict=True)]
@@ -84,7 +84,11 @@ def cells_along(
     slack = error.take(ray) * moved + (ARITHMETIC * ROUNDOFF) * size
     slack += np.where(size > 0, ROUNDOFF * np.abs(cubic[0]), 0.0)
     slowest = np.where(directions == 0, np.inf, np.abs(directions)).min(axis=0)
-    astray = np.minimum((2 * error / slowest).take(ray) / length, 1.0)
+    share = 2 * error / slowest
+    # A ray along a plane is astray throughout if rounding has put it there.
+    on_plane = (directions == 0) & (rests != 0) & (np.abs(origins - np.rint(origins)) <= error)
+    share[on_plane.any(axis=0)] = np.inf
+    astray = np.minimum(share.take(ray) / length, 1.0)
     n = len(ray)
     return Pieces(rays.take(ray), length, cubic, slack, astray, np.full(n, -1, np.intp), np.zeros(n))
 
@@ -99,24 +103,35 @@ def position_error(grid: CellGrid, origins: Floats, directions: Floats, spans: S
     furthest = np.maximum(np.abs(spans.t_near), np.abs(spans.t_far))
     reach = np.abs(origins) + 2 * furthest * np.abs(directions)
     size = max(grid.seen.shape) << grid.shift
-    return ROUNDOFF * (reach.max(axis=0) + size + 4)
+    return np.asarray(ROUNDOFF * (reach.max(axis=0) + size + 4))
 
 
-def recentred(origins: Floats, directions: Floats, spans: Spans) -> tuple[Floats, Spans]:
-    """Return the origins (3, R) moved to the middle of each span, and the spans from there.
+def recentred(
+    origins: Floats, directions: Floats, spans: Spans, shift: float
+) -> tuple[Floats, Floats, Spans]:
+    """Return origins (3, R) in the middle of each span plus `shift`, their rests, and the spans.
 
-    A ray that starts far away loses digits in o + t d at each of its pieces; moved once, with the sum and the
-    product kept to twice the digits (Dekker 1971), it loses half an ulp of the new origin.
+    The rests are what rounding took off the origins.
+
+    A ray that starts far away loses digits in o + t d at each of its pieces; moved once, with the sums and
+    the product kept to twice the digits (Dekker 1971; Knuth 1969), it loses half an ulp of the new origin.
     """
     inside = spans.t_far > spans.t_near
     t_near, t_far = (np.where(inside, t, 0.0) for t in (spans.t_near, spans.t_far))
     middle = 0.5 * (t_near + t_far)
     product = directions * middle
-    rest = _product_error(directions, middle, product)
-    moved = origins + product
-    virtual = moved - origins
-    rest += (origins - (moved - virtual)) + (product - virtual)
-    return moved + rest, Spans(t_near - middle, t_far - middle)
+    moved, rest = _two_sum(origins, product)
+    rest = rest + _product_error(directions, middle, product)
+    moved, more = _two_sum(moved, np.full_like(moved, shift))
+    moved, rest = _two_sum(moved, rest + more)
+    return moved, rest, Spans(t_near - middle, t_far - middle)
+
+
+def _two_sum(a: Floats, b: Floats) -> tuple[Floats, Floats]:
+    """Return a + b rounded, and what rounding took off it, exactly."""
+    total = a + b
+    virtual = total - a
+    return total, (a - (total - virtual)) + (b - virtual)
 
 
 def _product_error(a: Floats, b: Floats, product: Floats) -> Floats:
@@ -209,8 +224,8 @@ def _cubic(
 ) -> tuple[Floats, Floats, Floats]:
     """Return the cubic (4, n) of f(fraction + v stride) in the cell at `base`, and two sizes (n,).
 
-    f = k0 + kx x + ky y + kz z + kxy x y + kxz x z + kyz y z + kxyz x y z.  The first size bounds the sum of the
-    partial derivatives on the piece, the second the differences of the cell's samples.
+    f = k0 + kx x + ky y + kz z + kxy x y + kxz x z + kyz y z + kxyz x y z.  The first size bounds the sum of
+    the partial derivatives on the piece, the second the differences of the cell's samples.
     """
     # corner (dz, dy, dx) is number 4 dz + 2 dy + dx
     at = [corner.take(base).astype(np.float64, copy=False) for corner in corners]

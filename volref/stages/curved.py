@@ -1,7 +1,8 @@
 """Stage 6 for interpolated opacity: depth and emission of pieces whose extinction is -log1p(-opacity) / d0.
 
-n pieces, v from -1/2 to 1/2, k nodes.  On a piece between two bends the opacity a(v) = a0 + a1 g(v) is a cubic,
-so the extinction is analytic up to where the opacity reaches 1.  With h = length / d0 and l(v) = -h log1p(-a(v)),
+n pieces, v from -1/2 to 1/2, k nodes.  On a piece between two bends the opacity a(v) = a0 + a1 g(v) is a
+cubic, so the extinction is analytic up to where the opacity reaches 1.  With h = length / d0 and l(v) = -h
+log1p(-a(v)),
 
     depth  tau = integral of l,      J1 = integral of g l e^-t(v) dv,     t(v) = integral of l from -1/2 to v
 
@@ -11,12 +12,14 @@ semi-axes' sum rho (see `quadrature`) where q = |a1| max|g| / (1 - a0) < 1, |l -
     |error of tau| <= 32/15 N rho^-2k / (1 - rho^-2)
     |error of t|   <= (1 + Lambda) 2 N rho^(1-k) / (rho - 1) = P
 
-where Lambda <= k sqrt(k max(w) / 2), w the weights on [-1, 1], bounds the sum of the magnitudes of the Lagrange
-polynomials: by Cauchy-Schwarz and the reproducing kernel, sum l_j^2 / w_j = sum (n + 1/2) P_n^2 <= k^2 / 2.
+where Lambda <= k sqrt(k max(w) / 2), w the weights on [-1, 1], bounds the sum of the magnitudes of the
+Lagrange polynomials: by Cauchy-Schwarz and the reproducing kernel, sum l_j^2 / w_j = sum (n + 1/2) P_n^2 <=
+k^2 / 2.
 
-Where the opacity reaches 1 at a point, the depth has a logarithmic singularity but is finite: for a polynomial p
-of degree 3, mean log|p| >= log max|p| - 3 * 1.28 (each factor |v - r| loses at most 1.2785 against its
-greatest value, at r = 0.218 of the interval).  Pieces so short that this does not matter are not integrated.
+Where the opacity reaches 1 at a point, the depth has a logarithmic singularity but is finite: for a
+polynomial p of degree 3, mean log|p| >= log max|p| - 3 * 1.28 (each factor |v - r| loses at most 1.2785
+against its greatest value, at r = 0.218 of the interval).  Pieces so short that this does not matter are not
+integrated.
 """
 
 from dataclasses import dataclass
@@ -51,8 +54,8 @@ OPAQUE, MOST_DEPTH = 800.0, 1600.0
 class CurvedEmission:
     """Of n pieces, (n,) each: depth and its error, J1 and its error.
 
-    settled: False where no rule serves and the piece should be cut: J1 is only between bounds, and the depth may
-    be, too.
+    settled: False where no rule serves and the piece should be cut: J1 is only between bounds, and the depth
+    may be, too.
     """
 
     depth: Floats
@@ -92,9 +95,9 @@ def curved_emission(
 ) -> CurvedEmission:
     """Return depth and J1 of pieces with cubics (4, n) and opacities `opacity` + `slope` g(v).
 
-    `clear` (n,) is 1 - `opacity`, with all its digits where that is small.  `slack` is how far the value may be
-    off, `scale` is length / unit distance.  The order of each piece is the least whose error of depth stays below
-    `share` and that of J1 times `weight` too.
+    `clear` (n,) is 1 - `opacity`, with all its digits where that is small.  `slack` is how far the value may
+    be off, `scale` is length / unit distance.  The order of each piece is the least whose error of depth
+    stays below `share` and that of J1 times `weight` too.
     """
     n = len(scale)
     reach = 0.5 * np.abs(cubic[1]) + 0.25 * np.abs(cubic[2]) + 0.125 * np.abs(cubic[3])
@@ -117,7 +120,7 @@ def curved_emission(
                     dense=bool(dense[chosen[0]]),
                 )
     most = clear + np.abs(slope) * reach
-    off = np.where(slope == 0, 0.0, np.abs(slope) * slack + 8 * ROUNDOFF * np.minimum(most, 1.0))
+    off = np.where(slope == 0, 0.0, np.abs(slope) * slack + 8 * ROUNDOFF * np.where(dense, most, 1.0))
     least = clear - np.abs(slope) * reach
     with np.errstate(divide="ignore", invalid="ignore"):
         moved = np.where(off == 0, 0.0, np.where(least > 2 * off, scale * (off / (least - off)), FAR))
@@ -141,7 +144,7 @@ def _orders(
     weight: Floats,
     share: Floats,
 ) -> tuple[Indices, Floats, Floats]:
-    """Return order (0: none serves), error of the depth and of J1 (then those of the last order), (n,) each."""
+    """Return order, error of the depth and of J1, (n,) each; where no order serves, 0 and the last one's."""
     f1, f2, f3 = np.abs(cubic[1:])
     n = len(scale)
     order, depth_error, error = np.zeros(n, np.intp), np.full(n, FAR), np.full(n, FAR)
@@ -160,7 +163,8 @@ def _orders(
             of_first = light * tail + inner * np.minimum(middle + change, 1.0) * np.expm1(drift)
             of_depth = change * tail
             if k == ORDERS[-1]:
-                better = (order == 0) & (of_depth + of_first * weight < depth_error + error * weight)
+                with np.errstate(over="ignore"):
+                    better = (order == 0) & (of_depth + of_first * weight < depth_error + error * weight)
                 depth_error[better], error[better] = of_depth[better], of_first[better]
             good = (of_depth <= share) & (of_first * weight <= share) & ((order == 0) | (k < order))
             order[good], depth_error[good], error[good] = k, of_depth[good], of_first[good]
@@ -170,7 +174,10 @@ def _orders(
 def _integrals(
     cubic: Floats, middle: Floats, slope: Floats, scale: Floats, order: int, *, dense: bool
 ) -> tuple[Floats, Floats]:
-    """Return depth and J1; `middle` is what is clear in the middle if the pieces are `dense`, else the opacity."""
+    """Return depth and J1.
+
+    `middle` is what is clear in the middle if the pieces are `dense`, else the opacity there.
+    """
     nodes, weights, partial, _ = _rule(order)
     values = [((cubic[3] * v + cubic[2]) * v + cubic[1]) * v for v in nodes]
     if dense:
@@ -196,7 +203,7 @@ def _bracket(
     scale: Floats,
     reach: Floats,
 ) -> None:
-    """Fill in, in place, what no rule served: J1, the depth where its bounds are closer, and opaque pieces."""
+    """Fill in, in place, J1 where no rule served, depths whose bounds are closer, and opaque pieces."""
     open_ = np.flatnonzero(~result.settled | (result.depth_error >= FAR))
     if len(open_) == 0:
         return
@@ -205,7 +212,8 @@ def _bracket(
     odd = 0.5 * cubic[1] + 0.125 * cubic[3]
     ends = [0.25 * cubic[2] - odd, 0.0 * odd, 0.25 * cubic[2] + odd]
     somewhere = np.maximum.reduce([clear - slope * g for g in ends]) - off
-    # A part of a piece may be clear nowhere beyond doubt: then its depth has no bound, and cutting makes it worse.
+    # A part of a piece may be clear nowhere beyond doubt: then its depth has no bound, and cutting makes it
+    # worse.
     result.settled[open_] = somewhere < LEAST_CLEAR * off
     nearest = clear - np.abs(slope) * half - off
     farthest = np.minimum(clear + np.abs(slope) * half + off, 1.0)

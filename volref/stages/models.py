@@ -26,13 +26,17 @@ from volref.scene.transfer import TransferFunction
 # Columns of the rows.
 CENTER, SIGMA0, SIGMA1, SIGMA_OFF, COLOR_OFF = range(5)
 C0, C1, C2 = slice(5, 8), slice(8, 11), slice(11, 14)
-# Of exact rows only: opacity at the centre, what is clear there (1 - opacity, exact near 1), and the slope; the steepest extinction and colour on the pieces
-# beside; what misplacing an end costs per world length; where the opacity reaches 1 without a jump here or
-# beside, its least slope, else 0.
-ALPHA0, ALPHA1, BESIDE, COLOR_BESIDE, JUMP, JUMP_LIGHT, TOUCHING, CLEAR0 = range(14, 22)
-# 1 where anything can be seen, else 0.
-SEEN = 22
-COLUMNS = 23
+# Of exact rows only: opacity at the centre and its slope, the end where it is greatest, and what is clear
+# there;
+ALPHA0, ALPHA1, DENSE_END, LEAST_CLEAR = range(14, 18)
+# the steepest extinction and colour on the pieces beside; what misplacing an end costs per world length, in
+# extinction and in light; where the opacity reaches 1 without a jump here or beside, its least slope, else 0;
+BESIDE, COLOR_BESIDE, JUMP, JUMP_LIGHT, TOUCHING = range(18, 23)
+# 1 where the piece is opaque throughout; where the one below is, and the one above.
+IS_OPAQUE, OPAQUE_BELOW, OPAQUE_ABOVE = range(23, 26)
+# Of all rows: 1 where anything can be seen.
+SEEN = 26
+COLUMNS = 27
 
 # A run has at most this many pieces, fewer in long tables so that there are at most about MOST_ROWS rows.
 LONGEST, SHORTEST, MOST_ROWS = 48, 8, 1 << 16
@@ -83,8 +87,9 @@ class Models:
     """Rows (COLUMNS, rows) of models, and how to find them.
 
     bends (m + 1,): the values between which the exact rows hold.  blur: how close knots were taken for one.
-    most_sigma, most_jump, most_slope: the greatest finite extinction, jump and slope of it.  bent: whether any row's colour is.
-    unit_distance is None where the extinction is interpolated.  largest (3,): the greatest colour.
+    most_sigma, most_jump, most_slope: the greatest finite extinction, jump and slope of it.  bent: whether
+    any row's colour is. unit_distance is None where the extinction is interpolated.  largest (3,): the
+    greatest colour.
     """
 
     rows: Floats
@@ -98,6 +103,7 @@ class Models:
     most_jump: float
     most_slope: float
     bent: bool
+    opaque: bool
     unit_distance: float | None
     largest: Floats
 
@@ -131,6 +137,7 @@ def models_of(transfer: TransferFunction, low: float, high: float) -> Models:
         float(rows[JUMP].max()),
         float(rows[BESIDE].max()) if not rows[TOUCHING].any() else np.inf,
         bool(rows[C2].any()),
+        bool(rows[IS_OPAQUE].any()),
         unit_distance,
         np.maximum(table.left[:3].max(axis=1), table.right[:3].max(axis=1)),
     )
@@ -140,7 +147,7 @@ def _locator(breaks: Floats, low: float, high: float) -> Locator:
     inner = breaks[1:-1]
     span = max(high - low, 1e-300)
     gap = float(np.diff(inner).min()) if len(inner) > 1 else span
-    buckets = np.ceil(2 * span / gap) + 1
+    buckets = np.ceil(2 * span / gap) + 1 if gap > span / MOST_BUCKETS else 2 * MOST_BUCKETS
     width = span / buckets
     # A bucket of a few ulp could not tell its values apart.
     if buckets > MOST_BUCKETS or width < 16 * np.spacing(max(abs(low), abs(high))):
@@ -179,7 +186,7 @@ def rows_of(models: Models, low: Floats, high: Floats) -> Indices:
 
 
 def look_up(models: Models, values: Floats) -> tuple[Floats, Floats, Floats]:
-    """Return for values that are off by rounding a finite bound on extinction, colour (3, m) and how far it is off."""
+    """Return a finite bound on extinction, colour (3, m) and its error, for values off by rounding."""
     slack = NEARBY * np.abs(values)
     row = rows_of(models, values - slack, values + slack)
     rows = models.rows
@@ -196,7 +203,8 @@ def _divided(table: TablePieces, width: float) -> TablePieces:
     """Cut pieces wider than `width` into equal parts, up to FINEST of each."""
     if not width > 0:
         return table
-    parts = np.clip(np.ceil(np.diff(table.breaks) / width), 1, FINEST).astype(np.intp)
+    parts = np.minimum(np.clip(np.ceil(np.diff(table.breaks) / width), 1, FINEST), _most_parts(table))
+    parts = parts.astype(np.intp)
     piece = np.repeat(np.arange(len(parts)), parts)
     number = np.arange(len(piece)) - np.repeat(np.cumsum(parts) - parts, parts)
     return _cut(table, piece, number / parts[piece], (number + 1) / parts[piece])
@@ -204,12 +212,24 @@ def _divided(table: TablePieces, width: float) -> TablePieces:
 
 def _cut(table: TablePieces, piece: Indices, start: Floats, end: Floats) -> TablePieces:
     """Return the parts of pieces from the share `start` to `end` of each."""
-    breaks = table.breaks[:-1][piece] + np.diff(table.breaks)[piece] * start
+    width = np.diff(table.breaks)[piece]
+    breaks = np.append(table.breaks[:-1][piece] + width * start, table.breaks[-1])
+    # The channels are those of the rounded breaks.
+    begin = table.breaks[:-1][piece]
+    start = np.divide(breaks[:-1] - begin, width, out=np.zeros(len(width)), where=width > 0)
+    stop = np.divide(breaks[1:] - begin, width, out=np.ones(len(width)), where=width > 0)
     rise = (table.right - table.left)[:, piece]
-    left, right = table.left[:, piece] + rise * start, table.left[:, piece] + rise * end
+    left, right = table.left[:, piece] + rise * start, table.left[:, piece] + rise * stop
     whole = end == 1.0
     right[:, whole] = table.right[:, piece[whole]]
-    return dataclasses.replace(table, breaks=np.append(breaks, table.breaks[-1]), left=left, right=right)
+    hidden = np.zeros((len(left), len(breaks)))
+    return dataclasses.replace(table, breaks=breaks, left=left, right=right, hidden=hidden)
+
+
+def _most_parts(table: TablePieces) -> Floats:
+    """Return into how many parts each piece may be cut that are still wider than rounding, (n,)."""
+    ulp = np.spacing(np.maximum(np.abs(table.breaks[:-1]), np.abs(table.breaks[1:])))
+    return np.asarray(np.maximum(np.floor(np.diff(table.breaks) / (64 * ulp)), 1.0))
 
 
 def _refined(table: TablePieces) -> TablePieces:
@@ -220,7 +240,7 @@ def _refined(table: TablePieces) -> TablePieces:
     parts = np.clip(
         np.ceil(np.abs(depth[1] - depth[0]) / np.sqrt(8 * sag)), 1, max(MOST_PARTS // len(sag), 2)
     )
-    parts = parts.astype(np.intp)
+    parts = np.minimum(parts, _most_parts(table)).astype(np.intp)
     piece = np.repeat(np.arange(len(parts)), parts)
     number = np.arange(len(piece)) - np.repeat(np.cumsum(parts) - parts, parts)
     ends = []
@@ -286,7 +306,8 @@ def _padded(table: TablePieces, sag: Floats, count: int) -> tuple[TablePieces, F
     ends = [np.repeat(table.right[:, -1:], more, axis=1)] * 2
     left, right = (np.concatenate(pair, axis=1) for pair in zip((table.left, table.right), ends, strict=True))
     breaks = np.append(table.breaks, np.repeat(table.breaks[-1], more))
-    return TablePieces(breaks, left, right), np.append(sag, np.zeros(more))
+    hidden = np.zeros((len(left), len(breaks)))
+    return TablePieces(breaks, left, right, hidden), np.append(sag, np.zeros(more))
 
 
 def _fitted(table: TablePieces, sag: Floats, length: int, every: int) -> Floats:
@@ -390,35 +411,42 @@ def _exact_rows(straight: TablePieces, off: Floats, unit_distance: float | None)
     """Return the rows of the pieces between bends (COLUMNS, m)."""
     breaks, left, right = straight.breaks, straight.left, straight.right
     rows = np.zeros((COLUMNS, len(breaks) - 1))
-    rows[CENTER] = 0.5 * (breaks[:-1] + breaks[1:])
-    width = np.diff(breaks)
-    middle, slope = 0.5 * (left + right), (right - left) / width
+    rows[CENTER] = center = 0.5 * (breaks[:-1] + breaks[1:])
+    slope = (right - left) / np.diff(breaks)
+    middle = left + slope * (center - breaks[:-1])  # at the centre as it was rounded
     rows[C0], rows[C1] = middle[:3], slope[:3]
     rows[COLOR_OFF] = off[:3].max(axis=0)
     sigma = np.stack([left[STRENGTH], right[STRENGTH]])
+    hidden = straight.hidden[STRENGTH]
     if unit_distance is None:
         rows[SIGMA0], rows[SIGMA1], rows[SIGMA_OFF] = middle[STRENGTH], slope[STRENGTH], off[STRENGTH]
         steep = np.abs(slope[STRENGTH])
     else:
-        rows[ALPHA0], rows[ALPHA1] = middle[STRENGTH], slope[STRENGTH]
-        rows[CLEAR0] = 0.5 * ((1.0 - left[STRENGTH]) + (1.0 - right[STRENGTH]))
+        rows[ALPHA0], rows[ALPHA1] = np.clip(middle[STRENGTH], 0.0, 1.0), slope[STRENGTH]
+        rows[DENSE_END] = np.where(slope[STRENGTH] > 0, breaks[1:], breaks[:-1])
+        rows[LEAST_CLEAR] = clear = 1.0 - sigma.max(axis=0)
         with np.errstate(divide="ignore", invalid="ignore"):
-            clear = 1.0 - sigma.max(axis=0)
+            hidden = np.where(hidden > 0, -np.log1p(-hidden) / unit_distance, 0.0)
             sigma = -np.log1p(-sigma) / unit_distance
             steep = np.where(slope[STRENGTH] == 0, 0.0, np.abs(slope[STRENGTH]) / clear / unit_distance)
             rows[SIGMA_OFF] = np.where(off[STRENGTH] == 0, 0.0, off[STRENGTH] / clear / unit_distance)
+        opaque = np.isinf(sigma).all(axis=0)
+        rows[IS_OPAQUE], rows[OPAQUE_BELOW, 1:], rows[OPAQUE_ABOVE, :-1] = opaque, opaque[:-1], opaque[1:]
     touching = ~np.isfinite(steep)
     rows[BESIDE] = _with_neighbors(np.where(touching, 0.0, steep))
     least = np.where(touching, np.abs(slope[STRENGTH]), np.inf)
     least = -_with_neighbors(-least)
     rows[TOUCHING] = np.where(np.isfinite(least), least, 0.0)
     rows[COLOR_BESIDE] = _with_neighbors(np.abs(slope[:3]).max(axis=0))
-    rows[[JUMP, JUMP_LIGHT]] = _jumps(left, right, sigma)
+    rows[[JUMP, JUMP_LIGHT]] = _jumps(left, right, sigma, hidden, straight.hidden[:3])
     return rows
 
 
-def _jumps(left: Floats, right: Floats, sigma: Floats) -> Floats:
+def _jumps(left: Floats, right: Floats, sigma: Floats, hidden: Floats, hidden_color: Floats) -> Floats:
     """Return what misplacing the ends of each piece costs per world length, (2, m): extinction, and light.
+
+    hidden (m + 1,) is by how much the extinction varies among knots that were taken for one, and hidden_color
+    (3, m + 1) the colour.
 
     Beside an opaque piece, whatever is shown there instead is at most the light of the clearer one.
     """
@@ -426,7 +454,8 @@ def _jumps(left: Floats, right: Floats, sigma: Floats) -> Floats:
     opaque = ~np.isfinite(before) | ~np.isfinite(after)
     with np.errstate(invalid="ignore"):
         depth = np.where(opaque, 0.0, np.abs(after - before))
-    color = np.abs(left[:3, 1:] - right[:3, :-1]).max(axis=0)
+    depth = np.maximum(depth, hidden[1:-1])
+    color = np.maximum(np.abs(left[:3, 1:] - right[:3, :-1]), hidden_color[:, 1:-1]).max(axis=0)
     brightest = np.maximum(left[:3].max(), right[:3].max())
     clearer = np.minimum(before, after)
     light = np.where(opaque, np.where(np.isfinite(clearer), clearer, 0.0) * brightest, 0.0)

@@ -14,14 +14,15 @@ ends and the sum of semi-axes rho (as a multiple of half the length) is at most
 
     1/2 * 64/15 * M rho^(-2 k) / (1 - rho^-2)
 
-since a Chebyshev coefficient is at most 2 M rho^-j, the first degree that the rule misses is 2 k, and the rule
-and the integral of one even Chebyshev polynomial of degree j >= 4 differ by at most 2 + 2/15 (Trefethen 2008,
-theorem 4.5; the half is the length of the interval).  On that ellipse |v| <= R = (rho + 1/rho) / 4, which
-bounds g, A and t by their coefficients.
+since a Chebyshev coefficient is at most 2 M rho^-j, the first degree that the rule misses is 2 k, and the
+rule and the integral of one even Chebyshev polynomial of degree j >= 4 differ by at most 2 + 2/15 (Trefethen
+2008, theorem 4.5; the half is the length of the interval).  On that ellipse |v| <= R = (rho + 1/rho) / 4,
+which bounds g, A and t by their coefficients.
 """
 
 from dataclasses import dataclass
 from functools import cache
+from itertools import pairwise
 
 import numpy as np
 
@@ -42,7 +43,8 @@ MOST_EXPONENT, MOST_DENSITY = 300.0, 1e100
 class Moments:
     """Of n pieces: the moments J1 and J2 and the error of J1, (n,) each; J2 is 0 where it was not asked for.
 
-    The error of J2 is that of J1 times the greatest |g| in the ellipse, at most `REACH` times that on the piece.
+    The error of J2 is that of J1 times the greatest |g| in the ellipse, at most `REACH` times that on the
+    piece.
     """
 
     first: Floats
@@ -71,8 +73,8 @@ def gauss_pairs(order: int) -> tuple[float, tuple[tuple[float, float], ...]]:
 def moments(cubic: Floats, density: Floats, limit: Floats, *, second: bool) -> Moments:
     """Return the moments of pieces with cubics and densities A (4, n); `second` asks for J2.
 
-    The order of each piece is the least whose error of J1 stays below `limit` (n,).  Where none does, the moments
-    are those of the highest, if its error is less than what they can be at all, and else 0.
+    The order of each piece is the least whose error of J1 stays below `limit` (n,).  Where none does, the
+    moments are those of the highest, if its error is less than what they can be at all, and else 0.
     """
     order, error = _orders(cubic, density, limit)
     first, square = np.zeros_like(limit), np.zeros_like(limit)
@@ -89,12 +91,12 @@ def moments(cubic: Floats, density: Floats, limit: Floats, *, second: bool) -> M
 def _remainder(cubic: Floats, density: Floats, rho: float) -> Floats:
     """Return the remainder of J1 times rho^2k (n,), infinite where it is of no use."""
     r = (rho + 1 / rho) / 4
-    value = np.abs(cubic[3]) * r
+    value: Floats = np.abs(cubic[3]) * r
     value += np.abs(cubic[2])
     value *= r
     value += np.abs(cubic[1])
     value *= r
-    change = np.abs(density[3]) * r
+    change: Floats = np.abs(density[3]) * r
     change += np.abs(density[2])
     change *= r
     change += np.abs(density[1])
@@ -109,15 +111,15 @@ def _remainder(cubic: Floats, density: Floats, rho: float) -> Floats:
     with np.errstate(over="ignore"):
         value *= change
         value *= exponent
-    return value
+    return np.asarray(value)
 
 
 def _orders(cubic: Floats, density: Floats, limit: Floats) -> tuple[Indices, Floats]:
     """Return the index of each piece's order, len(ORDERS) where none serves, and the error of J1 (n,)."""
     error = _remainder(cubic, density, RHO)
-    index = np.zeros(len(limit), np.int8)
+    index = np.zeros(len(limit), np.intp)
     scaled = RHO ** (2 * ORDERS[0]) * np.minimum(limit, MOST_DENSITY)
-    for lower, upper in zip(ORDERS[:3], ORDERS[1:4], strict=True):
+    for lower, upper in pairwise(ORDERS[:4]):
         index += error > scaled
         scaled *= RHO ** (2 * (upper - lower))
     error *= (RHO ** (-2.0 * np.array(ORDERS[:4])))[index]
@@ -132,9 +134,9 @@ def _orders(cubic: Floats, density: Floats, limit: Floats) -> tuple[Indices, Flo
 def _searched(cubic: Floats, density: Floats, limit: Floats) -> tuple[Indices, Floats]:
     """Return the same, by the best of all ellipses."""
     bounds = [(rho, _remainder(cubic, density, rho)) for rho in (RHO, *RHOS)]
-    index, error = np.full(len(limit), len(ORDERS), np.int8), np.full(len(limit), np.inf)
+    index, error = np.full(len(limit), len(ORDERS), np.intp), np.full(len(limit), np.inf)
     for number, k in reversed(list(enumerate(ORDERS))):
-        least = np.minimum.reduce([bound * rho ** (-2 * k) for rho, bound in bounds])
+        least: Floats = np.minimum.reduce([bound * rho ** (-2 * k) for rho, bound in bounds])
         good = least <= limit
         index[good], error[good] = number, least[good]
         if number == len(ORDERS) - 1:

@@ -55,9 +55,9 @@ def layout_of(ray: Indices) -> Layout:
 def running_sums(values: Floats, layout: Layout) -> tuple[Floats, Floats, Floats]:
     """Return running sums (n,), and for each ray what they begin from and the ray's own sum (k,).
 
-    The sum over a ray up to and with a piece is the running sum there less what the ray begins from.  There is one
-    cumulative sum for all rays: each ray takes the sum of the ray before it off again, so that rounding is of the
-    size of the ray's own sums, and what is left of it is what the ray begins from.
+    The sum over a ray up to and with a piece is the running sum there less what the ray begins from.  There
+    is one cumulative sum for all rays: each ray takes the sum of the ray before it off again, so that
+    rounding is of the size of the ray's own sums, and what is left of it is what the ray begins from.
 
     Examples
     --------
@@ -165,4 +165,6 @@ def gathered(pieces: Modelled, layout: Layout, behind: Floats, brightest: float)
         contrast += lost
         np.maximum(share, contrast, out=share)
     rgba[:, 3] = 1.0 - transmittance * (1.0 - behind[:, 3])
-    return Gathered(rgba, np.add.reduceat(share, layout.first) + rounding, most_left, share)
+    # Nothing is darker than black, or brighter than the brightest.
+    bound = np.minimum(np.add.reduceat(share, layout.first) + rounding, brightest)
+    return Gathered(np.clip(rgba, 0.0, brightest, out=rgba), bound, most_left, share)

@@ -22,13 +22,13 @@ MOST_STEPS = 80
 # The least part that a piece is cut into: one that v can tell from none.
 LEAST_PART = 2.0**-50
 
-# Where the derivative is so small that more than this share of a piece may be near an end of its row, that share
-# is found by evaluation.
+# Where the derivative is so small that more than this share of a piece may be near an end of its row, that
+# share is found by evaluation.
 LEAST_SHARE = 1e-9
 
 
 def value_range(cubic: Floats) -> tuple[Floats, Floats]:
-    """Return bounds (n,) of the cubics (4, n) on their pieces: their least and greatest Bernstein coefficient.
+    """Return bounds (n,) of cubics (4, n) on their pieces: the least and greatest Bernstein coefficient.
 
     Those of a trilinear field along a ray are means of values in the cell, so they stay within its samples.
     """
@@ -68,7 +68,7 @@ def split_evenly(pieces: Pieces, counts: Indices) -> tuple[Pieces, Indices]:
 
 
 def split_geometrically(pieces: Pieces, first: Floats) -> tuple[Pieces, Indices]:
-    """Cut each piece into parts from its near end: the `first` (n,) share of it, and each up to twice that."""
+    """Cut each piece from its near end on: the `first` (n,) share of it, then the same, then twice, ..."""
     first = np.maximum(first, LEAST_PART)
     counts = np.where(first < 1, np.ceil(np.log2(1.0 / np.minimum(first, 1.0))), 0).astype(np.intp) + 1
     of, number = _numbered(counts)
@@ -95,7 +95,7 @@ def _parts(pieces: Pieces, of: Indices, start: Floats, end: Floats) -> tuple[Pie
 
 
 def _rounding_of_parts(cubic: Floats) -> Floats:
-    return 16 * ROUNDOFF * (np.abs(cubic[1]) + np.abs(cubic[2]) + np.abs(cubic[3]))
+    return np.asarray(16 * ROUNDOFF * (np.abs(cubic[1]) + np.abs(cubic[2]) + np.abs(cubic[3])))
 
 
 def split_at_bends(
@@ -114,9 +114,10 @@ def split_at_bends(
     counts = np.abs(last - first)
     part_of, number = _numbered(counts + 1)
     inner = number > 0
-    rising = np.where(last > first, 1, -1).take(part_of)
-    piece = first.take(part_of) + rising * number
-    crossing, crossed = part_of[inner], (piece + (rising < 0))[inner]
+    rising: Indices = np.where(last > first, 1, -1).take(part_of)
+    piece: Indices = first.take(part_of) + rising * number
+    crossing: Indices = part_of[inner]
+    crossed: Indices = (piece + (rising < 0))[inner]
     root = _roots(
         cubic.take(crossing, axis=1), start.take(crossing), end.take(crossing), places.take(crossed)
     )
@@ -125,7 +126,8 @@ def split_at_bends(
     starts[inner] = root
     ends[np.append(inner[1:], False)] = root
     kept = np.flatnonzero(ends > starts)
-    part_of, piece, starts, ends = (x.take(kept) for x in (part_of, piece, starts, ends))
+    part_of, piece = part_of.take(kept), piece.take(kept)
+    starts, ends = starts.take(kept), ends.take(kept)
     cubic = cubic.take(part_of, axis=1)
     of = of.take(part_of)
     slack = pieces.slack.take(of) + _beyond(cubic, starts, ends, places, piece)
@@ -239,7 +241,7 @@ def _share_near(cubic: Floats, slack: Floats, low: Floats, high: Floats) -> Floa
     flat = np.flatnonzero(~((least > 0) & (share < LEAST_SHARE)))
     if len(flat):
         share[flat] = _width_near(cubic[:, flat], slack[flat], low[flat], high[flat])
-    return share
+    return np.asarray(share)
 
 
 def _width_near(cubic: Floats, slack: Floats, low: Floats, high: Floats) -> Floats:

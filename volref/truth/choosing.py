@@ -1,8 +1,8 @@
 """Which method is cheapest where an estimate may do: measured on a few tiles of the image.
 
 The marcher's error is known only where the truth is.  So some tiles are integrated exactly and marched, which
-tells how its estimate relates to its error in this scene, which step meets the tolerance, how many pixels will
-have to be integrated exactly all the same, and what either costs.
+tells how its estimate relates to its error in this scene, which step meets the tolerance, how many pixels
+will have to be integrated exactly all the same, and what either costs.
 """
 
 import time
@@ -33,8 +33,8 @@ TRUER = 1e-2
 # The step is aimed at so that this share of the pixels is left to be integrated exactly.
 MOST_LEFT = 0.01
 
-# Where its leading term rules, the estimate is 8 times the error.  One that would have to be scaled up by more than
-# this has missed what matters, and may have missed more beside the tiles.
+# Where its leading term rules, the estimate is 8 times the error.  One that would have to be scaled up by
+# more than this has missed what matters, and may have missed more beside the tiles.
 LEAST_FACTOR, MOST_FACTOR = 1 / 8, 1.5
 
 # Marching has to be predicted to take less than this part of the time: prediction is rough.
@@ -51,7 +51,7 @@ class Choice:
 
 @dataclass(frozen=True, eq=False)
 class _Tried:
-    """A step on the pixels tried: the factor of its estimates, seconds per pixel in all, and a typical bound."""
+    """A step on the pixels tried: the factor of its estimates, seconds per pixel, a typical bound."""
 
     plan: Plan
     factor: float

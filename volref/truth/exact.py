@@ -8,7 +8,9 @@ model then is exact, or into shorter parts.
 """
 
 import dataclasses
+from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -17,21 +19,24 @@ from volref.planning import Plan, may_be_seen
 from volref.records import Pieces, Spans
 from volref.scene.blocks import block_ranges
 from volref.scene.scene import Scene
-from volref.scene.volume import Volume
 from volref.scene.transform import transform_directions, transform_points
+from volref.scene.volume import Volume
 from volref.stages.cells import CellGrid, cells_along, position_error, recentred
 from volref.stages.models import Models, look_up, models_of, piece_of
 from volref.stages.radiance import ROUNDOFF, Gathered, gathered
 from volref.stages.rays import pixel_rays
 from volref.stages.sampling import PAD, Grid, padded_grid, trilinear
 from volref.stages.spans import box_spans, cut_at_surface
-from volref.stages.splitting import split_at_bends, split_geometrically, value_range
+from volref.stages.splitting import split_at_bends, split_evenly, split_geometrically, value_range
 from volref.truth.modelling import Solved, modelled
 from volref.workspace import Workspace
 
 MOST_PASSES = 40
 
-# Above this many pieces of a chunk none is cut any more, and the bound stands as it is.
+# Pieces whose models are integrated together, and into how many parts one is cut at most.
+BATCH, MOST_PARTS = 1 << 14, 16
+
+# Above this many pieces of a batch none is cut any more, and the bound stands as it is.
 MOST_PIECES = 1 << 20
 
 # Below this tolerance pieces are cut at bends before they are first integrated.
@@ -111,54 +116,66 @@ def integrate_pixels(
     origins = transform_points(prepared.index_from_world, rays.origins).T
     directions = transform_directions(prepared.index_from_world, rays.directions).T
     spans = cut_at_surface(box_spans(origins, directions, prepared.low, prepared.high), distance)
-    origins, spans = _recentred(prepared, origins, directions, spans, distance)
-    done = integrate(prepared.grid, prepared.models, origins, directions, spans, behind, tolerance)
-    done.bound[:] += _error_of_ends(prepared, origins, directions, spans, behind, done)
+    origins, rests, spans, ends = _recentred(prepared, origins, directions, spans, distance)
+    done = integrate(prepared, origins, rests, directions, spans, behind, tolerance)
+    done.bound[:] += _error_of_ends(prepared, origins, directions, spans, ends, behind, done)
     return done
 
 
 def _recentred(
     prepared: Prepared, origins: Floats, directions: Floats, spans: Spans, distance: Floats
-) -> tuple[Floats, Spans]:
-    """Return padded origins in the middle of the spans, and the spans from there, their ends computed afresh.
+) -> tuple[Floats, Floats, Spans, Spans]:
+    """Return padded origins in the middle of the spans, their rests, the spans from there, and their errors.
 
-    Only a span that begins at the origin, or ends at a surface, keeps that end as it was.
+    The ends of the spans are computed afresh but for one at the origin, or at a surface.  The distance of a
+    face, (face - o) / d, is off by 3 u of itself with u the unit roundoff, and by the rest of the origin over
+    d.
     """
-    moved, moved_spans = recentred(origins + PAD, directions, spans)
+    moved, rests, kept = recentred(origins, directions, spans, PAD)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         faces = [(face[:, None] + PAD - moved) / directions for face in (prepared.low, prepared.high)]
+        errors = np.abs(rests / directions)
     parallel = directions == 0
-    near = np.where(parallel, -np.inf, np.minimum(*faces)).max(axis=0)
-    far = np.where(parallel, np.inf, np.maximum(*faces)).min(axis=0)
+    errors[parallel] = 0.0
+    near = np.where(parallel, -np.inf, np.minimum(*faces))
+    far = np.where(parallel, np.inf, np.maximum(*faces))
+    near_axis, far_axis = near.argmax(axis=0)[None], far.argmin(axis=0)[None]
+    at_near, at_far = (np.take_along_axis(errors, axis, axis=0)[0] for axis in (near_axis, far_axis))
+    near, far = near.max(axis=0), far.min(axis=0)
     inside = spans.t_far > spans.t_near
-    near = np.where(inside & (spans.t_near > 0), near, moved_spans.t_near)
-    far = np.where(inside & (spans.t_far < distance), far, moved_spans.t_far)
-    return moved, Spans(near, np.maximum(near, far))
+    near = np.where(inside & (spans.t_near > 0), near, kept.t_near)
+    far = np.where(inside & (spans.t_far < distance), far, kept.t_far)
+    far = np.maximum(near, far)
+    ends = Spans(at_near + 3 * ROUNDOFF * np.abs(near), at_far + 3 * ROUNDOFF * np.abs(far))
+    return moved, rests, Spans(near, far), ends
 
 
 def _error_of_ends(
-    prepared: Prepared, origins: Floats, directions: Floats, spans: Spans, behind: Floats, done: "Integral"
+    prepared: Prepared,
+    origins: Floats,
+    directions: Floats,
+    spans: Spans,
+    ends: Spans,
+    behind: Floats,
+    done: "Integral",
 ) -> Floats:
-    """Return what rounding of the spans' ends can add to the error (R,).
+    """Return what errors of the spans' ends, `ends`, can add to the error (R,).
 
-    The distance of a face, (face - o) / d, is off by at most 3 u of itself with u the unit roundoff: a piece of
-    that length may be missing or too much.  With tau its depth, it changes the light that leaves it by at most
-    1 - e^-tau times the difference of its colour and of what arrives: at the near end that is the image itself,
-    at the far end what lies behind, seen through all the rest.
+    A piece of that length may be missing or too much.  With tau its depth, it changes the light that leaves
+    it by at most 1 - e^-tau times the difference of its colour and of what arrives: at the near end that is
+    the image itself, at the far end what lies behind, seen through all the rest.
     """
     error = np.zeros(len(done.bound))
     inside = np.flatnonzero(spans.t_far > spans.t_near)
     low, high = prepared.low[:, None] + PAD, prepared.high[:, None] + PAD
-    near_end = spans.t_near, done.rgba, np.ones(len(error))
-    far_end = spans.t_far, behind, done.clear
-    for t, arriving, seen in (near_end, far_end):
-        t_inside = t[inside]
-        position = np.clip(origins[:, inside] + t_inside * directions[:, inside], low, high)
+    near_end = spans.t_near, ends.t_near, done.rgba, np.ones(len(error))
+    far_end = spans.t_far, ends.t_far, behind, done.clear
+    for t, off_by, arriving, seen in (near_end, far_end):
+        position = np.clip(origins[:, inside] + t[inside] * directions[:, inside], low, high)
         extinction, color, off = look_up(prepared.models, trilinear(prepared.samples, position, Workspace()))
         contrast = np.abs(color.T - arriving[inside, :3]).max(axis=1) + off
         contrast = np.maximum(contrast, 1.0 - arriving[inside, 3]) + done.bound[inside]
-        depth = np.minimum(3 * ROUNDOFF * np.abs(t_inside) * extinction, 1.0)
-        error[inside] += depth * contrast * seen[inside]
+        error[inside] += np.minimum(off_by[inside] * extinction, 1.0) * contrast * seen[inside]
     return error
 
 
@@ -180,21 +197,52 @@ class Integral:
 
 
 def integrate(
-    grid: CellGrid,
-    models: Models,
+    prepared: Prepared,
     origins: Floats,
+    rests: Floats,
     directions: Floats,
     spans: Spans,
     behind: Floats,
     tolerance: float,
 ) -> Integral:
     """Return the integral along rays (3, R) in padded index space over what lies `behind` (R, 4)."""
-    rgba, bound, clear = behind.copy(), np.zeros(len(behind)), np.ones(len(behind))
-    pieces = cells_along(grid, origins, directions, spans, precise=tolerance < PRECISE)
+    grid, models = prepared.grid, prepared.models
+    done = Integral(behind.copy(), np.zeros(len(behind)), np.ones(len(behind)), 0)
+    pieces = cells_along(grid, origins, rests, directions, spans, precise=tolerance < PRECISE)
     astray = 6 * grid.steepest * float(position_error(grid, origins, directions, spans).max(initial=0.0))
     if models.blur:
         pieces = dataclasses.replace(pieces, slack=pieces.slack + models.blur)
     brightest = _brightest(models, behind)
+    integrated = sum(
+        _integrate_pieces(models, part, behind, astray, brightest, tolerance, done)
+        for part in _batches(pieces)
+    )
+    return dataclasses.replace(done, pieces=integrated)
+
+
+def _batches(pieces: Pieces) -> Iterator[Pieces]:
+    """Yield the pieces in parts of whole rays whose arrays fit the cache."""
+    begins = np.ones(len(pieces.ray), np.bool_)
+    np.not_equal(pieces.ray[1:], pieces.ray[:-1], out=begins[1:])
+    start = 0
+    for begin, end in pairwise([*np.flatnonzero(begins).tolist(), len(pieces.ray)]):
+        if end - start > BATCH and begin > start:
+            yield pieces.part(start, begin)
+            start = begin
+    if start < len(pieces.ray):
+        yield pieces.part(start, len(pieces.ray))
+
+
+def _integrate_pieces(
+    models: Models,
+    pieces: Pieces,
+    behind: Floats,
+    astray: float,
+    brightest: float,
+    tolerance: float,
+    done: Integral,
+) -> int:
+    """Integrate pieces into `done` until their rays meet the tolerance; return how many it took."""
     if tolerance < CUT_AT_ONCE:
         pieces = _cut_at_bends(models, pieces, np.arange(len(pieces.ray)))
     integrated = 0
@@ -202,19 +250,20 @@ def integrate(
         if len(pieces.ray) == 0:
             break
         rays = pieces.ray[np.append(True, pieces.ray[1:] != pieces.ray[:-1])]
-        rgba[rays], bound[rays], clear[rays] = behind[rays], 0.0, 1.0  # all that is left of a ray may turn out to be clear
+        # All that is left of a ray may turn out to be clear.
+        done.rgba[rays], done.bound[rays], done.clear[rays] = behind[rays], 0.0, 1.0
         solved = modelled(models, pieces, astray, tolerance)
         integrated += len(solved.row)
         if len(solved.row) == 0:
             break
         rays = solved.layout.rays
         result = gathered(solved.integrals, solved.layout, behind[rays], brightest)
-        rgba[rays], bound[rays], clear[rays] = result.rgba, result.bound, result.clear
+        done.rgba[rays], done.bound[rays], done.clear[rays] = result.rgba, result.bound, result.clear
         bad = result.bound > tolerance
         if not bad.any() or len(solved.row) > MOST_PIECES:
             break
         pieces = _refined(models, solved, result, bad, tolerance)
-    return Integral(rgba, bound, clear, integrated)
+    return integrated
 
 
 def _cut_at_bends(models: Models, pieces: Pieces, chosen: Indices) -> Pieces:
@@ -240,12 +289,7 @@ def _in_place_of(pieces: Pieces, replaced: Indices, parts: Pieces, of: Indices) 
     kept[replaced] = False
     stay = np.flatnonzero(kept)
     order = np.argsort(np.concatenate([stay, replaced[of]]), kind="stable")
-    rest = pieces.take(stay)
-    joined = (
-        np.concatenate([getattr(rest, field.name), getattr(parts, field.name)], axis=-1).take(order, axis=-1)
-        for field in dataclasses.fields(Pieces)
-    )
-    return Pieces(*joined)
+    return pieces.take(stay).and_then(parts).take(order)
 
 
 def _refined(models: Models, solved: Solved, result: Gathered, bad: Booleans, tolerance: float) -> Pieces:
@@ -254,34 +298,47 @@ def _refined(models: Models, solved: Solved, result: Gathered, bad: Booleans, to
     Rays of which no piece can be made better by cutting are left out.
     """
     layout = solved.layout
-    count = layout.last - layout.first + 1
-    heavy = result.share * (2 * count.take(layout.member)) > tolerance
-    bent, thick, curved = _remedies(models, solved, result, heavy)
+    count = (layout.last - layout.first + 1).take(layout.member)
+    excess = result.share * (2 * count) / tolerance
+    bent, thick, curved = _remedies(models, solved, result, excess > 1)
     helped = np.zeros(len(bad), np.bool_)
     helped[layout.member[bent | thick | curved]] = True
     chosen = np.flatnonzero((bad & helped).take(layout.member))
     pieces = solved.pieces.take(chosen)
-    bent, thick, curved = bent[chosen], thick[chosen], curved[chosen]
-    steps = np.minimum(0.75 * TRANSLUCENT / solved.steepest[chosen], 0.5)
-    # From the last to the first, so that what is cut later keeps its place; thick ones are cut with the others.
+    bent, thick, curved, excess = bent[chosen], thick[chosen], curved[chosen], excess[chosen]
+    # What a model is off by falls with the square of the length at least.
+    parts = np.clip(np.ceil(np.sqrt(excess)), 1, MOST_PARTS).astype(np.intp)
+    even = np.flatnonzero(bent)
+    even = even[parts[even] < _bends_within(models, pieces, even)]
+    bent[even] = False
+    first: Floats = 1 / parts
+    first[thick] = np.minimum(0.75 * TRANSLUCENT / solved.steepest[chosen][thick], 0.5)
+    first[curved] = 0.25
     shorter = np.flatnonzero(thick | curved)
-    if len(shorter):
-        first = np.where(thick, steps, 0.25)[shorter]
-        parts, of = split_geometrically(pieces.take(shorter), first)
-        place = np.ones(len(chosen), np.intp)
-        place[shorter] = np.bincount(of, minlength=len(shorter))
-        bent = np.repeat(bent, place)
-        pieces = _in_place_of(pieces, shorter, _with_edges(models, parts), of)
-    return _cut_at_bends(models, pieces, np.flatnonzero(bent))
+    halves = (
+        split_evenly(pieces.take(even), parts[even]),
+        split_geometrically(pieces.take(shorter), first[shorter]),
+    )
+    cut, of = np.append(even, shorter), np.append(halves[0][1], len(even) + halves[1][1])
+    place = np.ones(len(chosen), np.intp)
+    place[cut] = np.bincount(of, minlength=len(cut))
+    if len(cut):
+        pieces = _in_place_of(pieces, cut, _with_edges(models, halves[0][0].and_then(halves[1][0])), of)
+    return _cut_at_bends(models, pieces, np.flatnonzero(np.repeat(bent, place)))
+
+
+def _bends_within(models: Models, pieces: Pieces, at: Indices) -> Indices:
+    """Return how many bends of the table lie within the values of the pieces `at`."""
+    low, high = value_range(pieces.cubic.take(at, axis=1))
+    return piece_of(models.bend_locator, high) - piece_of(models.bend_locator, low)
 
 
 def _with_edges(models: Models, parts: Pieces) -> Pieces:
     """Return parts of exact pieces without the edge that only their neighbours have."""
     low, high = value_range(parts.cubic)
-    piece = parts.row - models.exact
-    inside = (low - models.bends.take(piece) > parts.slack) & (
-        models.bends.take(piece + 1) - high > parts.slack
-    )
+    piece = np.maximum(parts.row - models.exact, 0)
+    above = low - models.bends.take(piece) > parts.slack
+    inside = (above & (models.bends.take(piece + 1) - high > parts.slack)) | (parts.row < 0)
     return dataclasses.replace(parts, edge=np.where(inside, 0.0, parts.edge))
 
 

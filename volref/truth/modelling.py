@@ -53,7 +53,11 @@ def modelled(models: Models, pieces: Pieces, astray: float, tolerance: float) ->
         pieces, row = pieces.take(seen), row.take(seen)
     layout = layout_of(pieces.ray)
     # There, what is seen may differ by a jump, or by as much as the value.
-    astray_sigma = min(models.most_sigma, models.most_jump + models.most_slope * astray) if astray else 0.0
+    astray_sigma = min(models.most_sigma, models.most_jump + models.most_slope * astray)
+    if models.opaque:
+        astray_sigma = models.most_sigma
+    if astray == 0:  # all cells are alike
+        astray_sigma = 0.0
     offset, reach, density, depth_error, light_error = _extinction(models, pieces, row, astray_sigma)
     color, slopes, bend, change = _color(models, row, offset, reach)
     steepest_color = change.max(axis=0)
@@ -74,6 +78,10 @@ def modelled(models: Models, pieces: Pieces, astray: float, tolerance: float) ->
         depth_error[at] += light.depth_error
         unsettled[at] = ~light.settled
         steepest[at] = np.where(light.settled & (light.depth >= OPAQUE), 0.0, light.depth)
+    if models.opaque:
+        unsure = _unsure_of_opacity(models, pieces, row, layout, astray)
+        depth_error[unsure] = np.inf
+        change[:, unsure] = models.largest.max()
     in_front = np.exp(-sums_in_front(np.minimum(depth, OPAQUE), layout))
     opacity = -np.expm1(-depth)
     steepest_color *= in_front
@@ -132,9 +140,10 @@ def _extinction(
 def _color(
     models: Models, row: Indices, offset: Floats, reach: Floats
 ) -> tuple[Floats, Floats, Floats | None, Floats]:
-    """Return the models' colours at the middle values, their derivatives, half their second ones, (3, n) each.
+    """Return the models' colours at the middle values and their derivatives, (3, n) each.
 
-    The second ones are None where all rows are straight.  Last, how far the colour leaves that of the middle.
+    Half the second derivatives follow; they are None where all rows are straight.  Last, how far the colour
+    leaves that of the middle.
     """
     rows = models.rows
     slopes = rows[column.C1].take(row, axis=1)
@@ -195,10 +204,10 @@ def _beside(
 
 
 def _touching(models: Models, pieces: Pieces, at: Indices, edge: Floats) -> Floats:
-    """Return the most depth within `edge` (world length) of where the opacity reaches 1, or 0, of pieces `at`.
+    """Return the most depth of pieces `at` within `edge` (world length) of where the opacity reaches 1.
 
-    There the clear part g = 1 - opacity is a cubic, at most G somewhere on the piece; on the share w of it, it
-    reaches G (w / 4)^3 (Remez), and its mean logarithm is at most 3.84 less (see `stages.curved`).
+    There the clear part g = 1 - opacity is a cubic, at most G somewhere on the piece; on the share w of it,
+    it reaches G (w / 4)^3 (Remez), and its mean logarithm is at most 3.84 less (see `stages.curved`).
     """
     assert models.unit_distance is not None
     slope = models.rows[column.TOUCHING].take(pieces.row[at])
@@ -218,15 +227,45 @@ def _curved(
     if len(at) == 0:
         return None
     rows, row = models.rows, row[at]
-    rise = rows[column.ALPHA1].take(row) * offset[at]
+    slope = rows[column.ALPHA1].take(row)
+    opacity = rows[column.ALPHA0].take(row) + slope * offset[at]
+    # What is clear, from the end where that is least: there it keeps all its digits.
+    above_end = np.abs(pieces.cubic[0, at] - rows[column.DENSE_END].take(row))
     light = curved_emission(
         pieces.cubic.take(at, axis=1),
-        np.clip(rows[column.ALPHA0].take(row) + rise, 0.0, 1.0),
-        np.clip(rows[column.CLEAR0].take(row) - rise, 0.0, 1.0),
-        rows[column.ALPHA1].take(row),
+        np.clip(opacity, 0.0, 1.0),
+        np.clip(rows[column.LEAST_CLEAR].take(row) + np.abs(slope) * above_end, 0.0, 1.0),
+        slope,
         pieces.slack[at],
         pieces.length[at] / models.unit_distance,
         steepest_color[at],
         np.full(len(at), share),
     )
     return at, light
+
+
+def _unsure_of_opacity(
+    models: Models, pieces: Pieces, row: Indices, layout: Layout, astray: float
+) -> Indices:
+    """Return the pieces that may, or may not, be stopped by something opaque: their P is unknown.
+
+    An opaque piece is sure if some of it is neither near an end of its row nor astray.  A clear one that
+    comes within its slack of an opaque row is no matter if the next piece of the ray is surely opaque: it
+    begins a little earlier or later.  Otherwise the ray touches what is opaque, or misses it, by rounding.
+    """
+    rows = models.rows
+    opaque = rows[column.IS_OPAQUE].take(row) > 0
+    sure = opaque & (pieces.edge + pieces.astray < 1)
+    below, above = rows[column.OPAQUE_BELOW].take(row) > 0, rows[column.OPAQUE_ABOVE].take(row) > 0
+    beside = np.flatnonzero(below | above)
+    touches = np.zeros(len(row), np.bool_)
+    if len(beside):
+        low, high = value_range(pieces.cubic.take(beside, axis=1))
+        slack = pieces.slack.take(beside) + astray
+        bend = np.maximum(row[beside] - models.exact, 0)
+        touches[beside] = (below[beside] & (low - slack <= models.bends.take(bend))) | (
+            above[beside] & (high + slack >= models.bends.take(bend + 1))
+        )
+    stopped = np.append(sure[1:], False)
+    stopped[layout.last] = False
+    return np.flatnonzero((opaque & ~sure) | (touches & ~stopped & ~opaque))

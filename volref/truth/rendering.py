@@ -52,8 +52,8 @@ def render(
         What to draw.
     method
         "march": the midpoint rule in float64 with exponential opacities at a uniform step, and an estimate of
-        its error.  "exact": the integral with a proven bound, at the cost that `tolerance` takes.  "auto": the
-        cheapest whose bound meets the tolerance.
+        its error.  "exact": the integral with a proven bound, at the cost that `tolerance` takes.  "auto":
+        the cheapest whose bound meets the tolerance.
     tolerance
         The error per pixel in the working space, over all four channels; `met_tolerance` compares.
     certified
@@ -83,7 +83,10 @@ def render(
     canvas = _Canvas(scene, surface, workers, progress, deadline)
     if decided.method == "march":
         kind = "estimate"
-        canvas.draw(_marcher(scene, decided, field_of(scene) if decided.includes("volume") else None, canvas), _runs(scene))
+        canvas.draw(
+            _marcher(scene, decided, field_of(scene) if decided.includes("volume") else None, canvas),
+            _runs(scene),
+        )
     else:
         kind, decided = _draw_to_tolerance(scene, decided, canvas)
     shape = scene.height, scene.width
@@ -100,7 +103,7 @@ def render(
 
 
 class _Canvas:
-    """Pixels being filled in: rgba (H W, 4), bound (H W,), the surface's distance, and the work spent so far."""
+    """Pixels being filled in: rgba (H W, 4), bound (H W,), and the work spent so far."""
 
     def __init__(
         self,
@@ -158,7 +161,7 @@ def _marcher(scene: Scene, plan: Plan, field: Field | None, canvas: _Canvas) -> 
 
 
 def _draw_to_tolerance(scene: Scene, plan: Plan, canvas: _Canvas) -> tuple[str, Plan]:
-    """Draw by the exact method, or, if the plan leaves the choice, by the cheaper one; return kind and plan."""
+    """Draw by the exact method, or the cheaper one if the plan leaves the choice; return kind, plan."""
     prepared = prepare(scene, plan) if plan.includes("volume") else None
     if plan.method == "auto" and prepared is not None:
         behind = canvas.behind(np.arange(len(canvas.distance)))
@@ -170,9 +173,7 @@ def _draw_to_tolerance(scene: Scene, plan: Plan, canvas: _Canvas) -> tuple[str, 
     return "certified", dataclasses.replace(plan, method="exact")
 
 
-def _march_then_mend(
-    scene: Scene, choice: Choice, field: Field, prepared: Prepared, canvas: _Canvas
-) -> Plan:
+def _march_then_mend(scene: Scene, choice: Choice, field: Field, prepared: Prepared, canvas: _Canvas) -> Plan:
     """March, scale the estimates, and integrate exactly the pixels whose estimate exceeds the tolerance."""
     plan, shape = choice.plan, (scene.height, scene.width)
     canvas.draw(_marcher(scene, plan, field, canvas), _runs(scene))
