@@ -95,7 +95,9 @@ def _parts(pieces: Pieces, of: Indices, start: Floats, end: Floats) -> tuple[Pie
 
 
 def _rounding_of_parts(cubic: Floats) -> Floats:
-    return np.asarray(16 * ROUNDOFF * (np.abs(cubic[1]) + np.abs(cubic[2]) + np.abs(cubic[3])))
+    """Return what cutting a piece rounds its values by: its change 16 times, its value twice if it changes."""
+    change = np.abs(cubic[1]) + np.abs(cubic[2]) + np.abs(cubic[3])
+    return np.asarray(ROUNDOFF * (16 * change + np.where(change > 0, 2 * np.abs(cubic[0]), 0.0)))
 
 
 def split_at_bends(
@@ -235,8 +237,9 @@ def _share_near(cubic: Floats, slack: Floats, low: Floats, high: Floats) -> Floa
     Where the derivative stays above d, that is at most 2 slack / d for either; elsewhere the share is the
     first of some widths from an end beyond which the value is further away.
     """
+    slack = slack + _rounding_of_parts(cubic)  # of comparing
     least = np.abs(cubic[1]) - np.abs(cubic[2]) - 0.75 * np.abs(cubic[3])
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         share = np.minimum(4 * slack / least, 1.0)
     flat = np.flatnonzero(~((least > 0) & (share < LEAST_SHARE)))
     if len(flat):

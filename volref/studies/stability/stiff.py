@@ -270,8 +270,8 @@ CASES = (
         "Where the table jumps from opacity 0.2 to 1, does the ray end there, in the colour that it meets?",
         "1 - 0.8^4.4 of blue over the opaque colour",
         f"{SHADER}: the surface lies within a step",
-        "march: the opacity, 1 - 0.8^step, of the step in which the jump lies.  exact: its certificate, at most "
-        "1e-11: where two cells meet, what is opaque may lie in either",
+        "march: the opacity, 1 - 0.8^step, of the step in which the jump lies.  exact: its certificate, at "
+        "most 1e-11: where two cells meet, what is opaque may lie in either",
         _jump_to_opaque,
     ),
     Case(
