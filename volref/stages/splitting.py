@@ -95,7 +95,7 @@ def _parts(pieces: Pieces, of: Indices, start: Floats, end: Floats) -> tuple[Pie
 
 
 def _rounding_of_parts(cubic: Floats) -> Floats:
-    """Return what cutting a piece rounds its values by: its change 16 times, its value twice if it changes."""
+    """Return what cutting pieces rounds: their change 16 times, and their value twice unless constant."""
     change = np.abs(cubic[1]) + np.abs(cubic[2]) + np.abs(cubic[3])
     return np.asarray(ROUNDOFF * (16 * change + np.where(change > 0, 2 * np.abs(cubic[0]), 0.0)))
 
