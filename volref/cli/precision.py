@@ -103,9 +103,7 @@ def _subjects(options: argparse.Namespace) -> list["Subject"]:
 def _targets(options: argparse.Namespace, names: list[str]) -> dict[str, Path]:
     """Refuse what could not be written, before the work; return where each scene's plot goes."""
     from volref.io.atomic import check_free
-    from volref.studies.precision.methods import chosen_methods
 
-    chosen_methods(options.methods)
     plots = {}
     if options.plot:
         from volref.report.plots import check_matplotlib, plot_paths
