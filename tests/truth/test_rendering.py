@@ -10,6 +10,7 @@ import volref as vr
 from tests.scenes import rough_scene, sparse_scene
 from volref.phantoms.meshes import sphere_mesh
 from volref.truth import rendering
+from volref.truth.choosing import Choice
 from volref.truth.exact import integrate_pixels
 
 
@@ -41,6 +42,22 @@ def test_auto_is_certified_by_default_and_says_that_exact_answered(scene, truth)
         out = vr.render(scene, **more)
         assert (out.plan.method, out.bound_kind, out.met_tolerance) == ("exact", "certified", True)
         assert_covered(out, truth)
+
+
+@pytest.mark.parametrize("cheaper", ["exact", "march"])
+def test_auto_says_which_method_answered_where_an_estimate_may_do(scene, truth, monkeypatch, cheaper):
+    # Which one is cheaper is measured, so a test has to say it.
+    marching = Choice(vr.plan(scene, method="march", step=0.05), 1.0)
+    chosen = marching if cheaper == "march" else None
+    monkeypatch.setattr(rendering, "choose", lambda *_: chosen)
+    out = vr.render(scene, certified=False)
+    assert out.plan.method == cheaper
+    assert out.bound_kind == {"march": "estimate", "exact": "certified"}[cheaper]
+    assert out.met_tolerance
+    assert_covered(out, truth)
+    told = [stage.reason for stage in out.plan.stages if stage.name == "method"]
+    assert len(told) == (cheaper == "march")
+    assert all("marched, its estimates scaled by 1 " in reason for reason in told)
 
 
 def test_a_march_says_that_its_error_is_an_estimate(scene):
