@@ -1,4 +1,4 @@
-"""NumPy's exponentials and logarithms are as good as the certificate takes them to be (docs/certificate.md)."""
+"""NumPy's exponentials and logarithms are as good as the certificate takes them to be."""
 
 import mpmath as mp
 import numpy as np

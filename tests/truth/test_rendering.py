@@ -2,6 +2,7 @@
 
 import dataclasses
 import time
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -171,3 +172,16 @@ def test_seconds_are_those_that_passed(scene):
     started = time.perf_counter()
     out = vr.render(scene, method="exact")
     assert 0 < out.seconds <= time.perf_counter() - started
+
+
+def test_more_time_never_makes_a_bound_worse(scene, monkeypatch):
+    bounds = []
+    for ticks in (3, 40, 400):
+        clock = iter(range(10**6))
+        monkeypatch.setattr(
+            "volref.truth.rendering.time.perf_counter", lambda clock=clock: float(next(clock))
+        )
+        out = vr.render(scene, method="exact", tolerance=1e-6, max_seconds=ticks, threads=1)
+        bounds.append(out.bound)
+    for less, more in pairwise(bounds):
+        assert (more <= np.maximum(less, 1e-6)).all()

@@ -101,3 +101,11 @@ def test_a_scene_of_meshes_only_has_no_segments():
 def test_pixels_outside_the_image_are_refused(pixel):
     with pytest.raises(vr.SceneError, match="pixel"):
         vr.trace(rough_scene(12, 9), pixel)
+
+
+def test_the_plan_of_another_method_is_refused_with_a_cure():
+    scene = rough_scene()
+    with pytest.raises(vr.SceneError, match="plan must be a march's, got method 'exact'; make one with"):
+        vr.trace(scene, (0, 0), plan=vr.plan(scene, method="exact"))
+    planned = vr.trace(scene, (0, 0), plan=vr.plan(scene, method="march"))
+    assert str(planned) == str(vr.trace(scene, (0, 0)))

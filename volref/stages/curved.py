@@ -222,6 +222,7 @@ def _bracket(
         high = np.where(nearest > 0, -np.log(nearest), np.inf)
         high = scale * np.fmin(high, np.where(somewhere > 0, LOGARITHM_LOSS - np.log(somewhere), np.inf))
     high = np.minimum(high, MOST_DEPTH)
+    low = np.minimum(low, high)
     # Where the clear part falls to 0 along a straight line, the mean of -log is 1 more than at its greatest.
     guess = np.where(nearest > 0, 0.5 * (low + high), np.minimum(low + scale, high))
     between = np.maximum(high - guess, guess - low) + 16 * ROUNDOFF * high

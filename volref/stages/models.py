@@ -39,10 +39,10 @@ SEEN = 26
 COLUMNS = 27
 
 # A run has at most this many pieces, fewer in long tables so that there are at most about MOST_ROWS rows.
-LONGEST, SHORTEST, MOST_ROWS = 48, 8, 1 << 16
+LONGEST, SHORTEST, MOST_ROWS = 24, 8, 1 << 16
 
 # Pieces are cut to at most this part of the volume's values, so that a run near a bend can be short.
-FINEST = 128
+FINEST = 256
 
 # A piece of interpolated opacity is cut until its extinction is straight to this part of itself,
 # or to this optical depth per unit distance; above the last opacity it is left as it is.

@@ -101,14 +101,20 @@ def _rounding_of_parts(cubic: Floats) -> Floats:
 
 
 def split_at_bends(
-    pieces: Pieces, places: Floats, piece_of: Callable[[Floats], Indices], first_row: int
+    pieces: Pieces,
+    places: Floats,
+    piece_of: Callable[[Floats], Indices],
+    first_row: int,
+    *,
+    jumps: bool = True,
 ) -> tuple[Pieces, Indices]:
     """Cut pieces where the value reaches one of `places`, so that each part lies between two of them.
 
     Returns the parts, and which piece each comes from.
 
     `piece_of` tells which two: piece j lies between places[j] and places[j + 1].  A part's row becomes
-    `first_row` + j, and its slack grows by how far it reaches beyond them, which is rounding.
+    `first_row` + j, and its slack grows by how far it reaches beyond them, which is rounding.  `jumps` asks
+    for tight edges, which matter where what is seen jumps at a place.
     """
     of, start, end = _monotone_parts(pieces.cubic)
     cubic = pieces.cubic.take(of, axis=1)
@@ -136,7 +142,7 @@ def split_at_bends(
     astray = np.minimum(pieces.astray.take(of) / (ends - starts), 1.0)
     length = pieces.length.take(of) * (ends - starts)
     cubic = part(cubic, starts, ends)
-    edge = _share_near(cubic, slack, places.take(piece), places.take(piece + 1))
+    edge = _share_near(cubic, slack, places.take(piece), places.take(piece + 1), tight=jumps)
     return Pieces(pieces.ray.take(of), length, cubic, slack, astray, piece + first_row, edge), of
 
 
@@ -195,7 +201,7 @@ def _roots(cubic: Floats, low: Floats, high: Floats, target: Floats) -> Floats:
             u = u - value(u) / ((3 * c3 * u + 2 * c2) * u + c1)
             u = np.fmin(np.fmax(u, low), high)
     scale = np.abs(c0) + np.abs(c1) + np.abs(c2) + np.abs(c3)
-    off = np.flatnonzero(~(np.abs(value(u)) <= 4 * ROUNDOFF * scale))
+    off = np.flatnonzero(~(np.abs(value(u)) <= 16 * ROUNDOFF * scale))
     if len(off):
         u[off] = _bisected(cubic[:, off], low[off], high[off], target[off])
     return u
@@ -231,11 +237,13 @@ def _beyond(cubic: Floats, start: Floats, end: Floats, places: Floats, piece: In
     return np.asarray(np.maximum(np.maximum(below, above), 0.0) + _rounding_of_parts(cubic))
 
 
-def _share_near(cubic: Floats, slack: Floats, low: Floats, high: Floats) -> Floats:
+def _share_near(cubic: Floats, slack: Floats, low: Floats, high: Floats, *, tight: bool) -> Floats:
     """Return the share of monotone pieces where the value is within `slack` of `low` or `high`, (n,).
 
-    Where the derivative stays above d, that is at most 2 slack / d for either; elsewhere the share is the
-    first of some widths from an end beyond which the value is further away.
+    Where the derivative stays above d, that is at most 2 slack / d for either.  Elsewhere a monotone cubic
+    that changes by D on the piece changes by D w^3 / 4 at least on a share w from an end, since its
+    derivative is a square there at worst; or, if it is to be `tight`, the share is the first of some widths
+    from an end beyond which the value is further away.
     """
     slack = slack + _rounding_of_parts(cubic)  # of comparing
     least = np.abs(cubic[1]) - np.abs(cubic[2]) - 0.75 * np.abs(cubic[3])
@@ -243,7 +251,12 @@ def _share_near(cubic: Floats, slack: Floats, low: Floats, high: Floats) -> Floa
         share = np.minimum(4 * slack / least, 1.0)
     flat = np.flatnonzero(~((least > 0) & (share < LEAST_SHARE)))
     if len(flat):
-        share[flat] = _width_near(cubic[:, flat], slack[flat], low[flat], high[flat])
+        if tight:
+            share[flat] = _width_near(cubic[:, flat], slack[flat], low[flat], high[flat])
+        else:
+            change = np.abs(cubic[1, flat] + 0.25 * cubic[3, flat])
+            with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+                share[flat] = np.fmin(2 * np.cbrt(4 * slack[flat] / change), 1.0)
     return np.asarray(share)
 
 

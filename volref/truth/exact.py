@@ -34,13 +34,13 @@ from volref.workspace import Workspace
 MOST_PASSES = 40
 
 # Pieces whose models are integrated together, and into how many parts one is cut at most.
-BATCH, MOST_PARTS = 1 << 14, 16
+BATCH, MOST_PARTS = 1 << 15, 16
 
 # Above this many pieces of a batch none is cut any more, and the bound stands as it is.
 MOST_PIECES = 1 << 20
 
-# Below this tolerance pieces are cut at bends before they are first integrated.
-CUT_AT_ONCE = 1e-5
+# Below this tolerance, and where bends are few, pieces are cut at them before they are first integrated.
+CUT_AT_ONCE, FEW_BENDS = 1e-5, 32
 
 # Below this one the bound on rounding is made tight.
 PRECISE = 1e-8
@@ -243,7 +243,7 @@ def _integrate_pieces(
     done: Integral,
 ) -> int:
     """Integrate pieces into `done` until their rays meet the tolerance; return how many it took."""
-    if tolerance < CUT_AT_ONCE:
+    if tolerance < CUT_AT_ONCE or len(models.bends) <= FEW_BENDS:
         pieces = _cut_at_bends(models, pieces, np.arange(len(pieces.ray)))
     integrated = 0
     for _ in range(MOST_PASSES):
@@ -278,7 +278,11 @@ def _cut_at_bends(models: Models, pieces: Pieces, chosen: Indices) -> Pieces:
     if len(crossing) == 0:
         return pieces
     parts, of = split_at_bends(
-        pieces.take(crossing), models.bends, lambda x: piece_of(models.bend_locator, x), models.exact
+        pieces.take(crossing),
+        models.bends,
+        lambda x: piece_of(models.bend_locator, x),
+        models.exact,
+        jumps=models.most_jump > 0 or models.opaque,
     )
     return _in_place_of(pieces, crossing, parts, of)
 

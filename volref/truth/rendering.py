@@ -126,8 +126,8 @@ class _Canvas:
     def behind(self, pixels: Indices) -> Floats:
         return light_behind(self.scene, self.surface, pixels)
 
-    def draw(self, integrator: Integrator, parts: Sequence[Indices]) -> None:
-        """Fill in `parts` until the deadline; what is not reached stays as it is."""
+    def draw(self, integrator: Integrator, parts: Sequence[Indices], *, only_better: bool = False) -> None:
+        """Fill in `parts` until the deadline; what is not reached, or was known better, stays as it is."""
 
         def fill(part: Indices) -> int:
             if time.perf_counter() > self.deadline:
@@ -137,7 +137,10 @@ class _Canvas:
                 rgba, bound, samples = integrator(part, work)
             finally:
                 self._spare.put(work)  # a thread that waited for it would wait for ever
-            self.rgba[part], self.bound[part] = rgba, bound
+            better = np.ones(len(part), np.bool_)
+            if only_better:
+                better = bound <= self.bound[part]
+            self.rgba[part[better]], self.bound[part[better]] = rgba[better], bound[better]
             return samples
 
         self.samples += _sum_in_threads(fill, parts, self.workers, self.progress)
@@ -200,9 +203,10 @@ def _draw_exactly(scene: Scene, tolerance: float, prepared: Prepared | None, can
     """Integrate every pixel to the tolerance; against a deadline, all of them roughly first."""
     parts = _tiles(scene)
     if canvas.deadline < np.inf:
-        canvas.draw(_integrator(scene, np.inf, prepared, canvas), parts)
+        canvas.draw(_integrator(scene, np.inf, prepared, canvas), parts, only_better=True)
         parts = [part for part in parts if canvas.bound[part].max() > tolerance]
-    canvas.draw(_integrator(scene, tolerance, prepared, canvas), parts)
+    timed = canvas.deadline < np.inf
+    canvas.draw(_integrator(scene, tolerance, prepared, canvas), parts, only_better=timed)
 
 
 def _runs(scene: Scene) -> list[Indices]:

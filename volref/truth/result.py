@@ -26,9 +26,9 @@ class Render:
     seconds
         Wall time of the rendering.
     samples
-        Values interpolated.
+        Values interpolated by a march, or pieces integrated by the exact method.
     threads
-        Threads that marched.
+        Threads that worked.
     plan
         What was done and what was left out.
     """

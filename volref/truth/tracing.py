@@ -88,7 +88,10 @@ def trace(
     SceneError
         If the pixel lies outside the image, or an argument breaks a rule of `volref.plan`.
     """
-    decided = decide(scene, plan, "march", step)
+    decided = decide(scene, plan, "march" if plan is None else "auto", step)
+    if decided.method != "march":
+        message = f"plan must be a march's, got method {decided.method!r}; make one with method='march'"
+        raise SceneError(message)
     x, y = _checked_pixel(scene, pixel)
     flat = np.array([y * scene.width + x])
     rays = pixel_rays(scene.camera, scene.width, scene.height, flat)
