@@ -359,3 +359,10 @@ def test_it_imports_no_part_of_an_integrator():
             names = [node.module] if isinstance(node, ast.ImportFrom) else []
             names += [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
             assert all(name.startswith(allowed) for name in names if name.startswith("volref")), path.name
+
+
+def test_a_field_that_is_constant_on_a_knot_of_opacity_1_is_opaque():
+    volume = Volume(np.full((3, 3, 3), 2.0))
+    table = TransferFunction([1, 2, 3], [(0, 0, 0), (0.3, 0.5, 0.7), (1, 1, 1)], opacity=[0.0, 1.0, 0.3])
+    done = ray_integral(volume, table, (1.0, 1.0, -5.0), (0.0, 0.0, 1.0))
+    assert [float(c) for c in done.rgba] == [0.3, 0.5, 0.7, 1.0]

@@ -179,7 +179,8 @@ def _rounded(mp: Context, exact: Fraction) -> Number:
 def _through_piece(mp: Context, light: Light, medium: Medium, piece: Piece) -> Light:
     """Return the light after a piece: step by step, each as long as its series allows."""
     interval = medium.interval
-    if interval.opaque:
+    on_a_knot = medium.unit_distance is not None and not any(piece.cubic[1:])
+    if interval.opaque or (on_a_knot and interval.strength_at(piece.cubic[0]) == 1):
         front = interval.color_at(evaluate(piece.cubic, piece.start))
         color = [c + light.transmittance * f for c, f in zip(light.color, front, strict=True)]
         return Light(tuple(color), mp.inf, mp.zero, light.remainder)
