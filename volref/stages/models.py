@@ -42,7 +42,10 @@ COLUMNS = 27
 LONGEST, SHORTEST, MOST_ROWS = 24, 8, 1 << 16
 
 # Pieces are cut to at most this part of the volume's values, so that a run near a bend can be short.
-FINEST = 256
+FINEST = 128
+
+# Tables with at most so many bends need no short runs: their pieces are cut at the bends at once.
+FEW_BENDS = 32
 
 # A piece of interpolated opacity is cut until its extinction is straight to this part of itself,
 # or to this optical depth per unit distance; above the last opacity it is left as it is.
@@ -113,8 +116,10 @@ def models_of(transfer: TransferFunction, low: float, high: float) -> Models:
     unit_distance = transfer.unit_distance if transfer.extinction is None else None
     table = table_pieces(transfer, low, high)
     straight, off = without_straight_breaks(table)
-    fine = _divided(table, (high - low) / FINEST)
-    fine = fine if unit_distance is None else _refined(fine)
+    few = len(straight.breaks) <= FEW_BENDS
+    # Where bends are few, pieces are cut at them before they are integrated, and runs hardly matter.
+    fine = straight if few else _divided(table, (high - low) / FINEST)
+    fine = fine if unit_distance is None or few else _refined(fine)
     fine, sag = _in_extinction(fine, unit_distance)
     blocks, levels, count = [], [], 0
     for shift, groups, longest, block in _levels(fine, sag):

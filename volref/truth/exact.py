@@ -22,7 +22,7 @@ from volref.scene.scene import Scene
 from volref.scene.transform import transform_directions, transform_points
 from volref.scene.volume import Volume
 from volref.stages.cells import CellGrid, cells_along, position_error, recentred
-from volref.stages.models import Models, look_up, models_of, piece_of
+from volref.stages.models import FEW_BENDS, Models, look_up, models_of, piece_of
 from volref.stages.radiance import ROUNDOFF, Gathered, gathered
 from volref.stages.rays import pixel_rays
 from volref.stages.sampling import PAD, Grid, padded_grid, trilinear
@@ -40,7 +40,7 @@ BATCH, MOST_PARTS = 1 << 15, 16
 MOST_PIECES = 1 << 20
 
 # Below this tolerance, and where bends are few, pieces are cut at them before they are first integrated.
-CUT_AT_ONCE, FEW_BENDS = 1e-5, 32
+CUT_AT_ONCE = 1e-5
 
 # Below this one the bound on rounding is made tight.
 PRECISE = 1e-8
