@@ -250,10 +250,14 @@ def _cubic(
     cubic[2] = 0.5 * (turn_x * dx + turn_y * dy + turn_z * dz)
     cubic[3] = kxyz * dx * dy * dz
     if not precise:
-        spread = np.abs(kx)
-        for k in (ky, kz, kxy, kxz, kyz, kxyz):
-            spread += np.abs(k)
-        return cubic, spread, spread
+        mixed = np.abs(kxy)
+        mixed += np.abs(kxz)
+        mixed += np.abs(kyz)
+        mixed *= 2  # each is part of two derivatives, and the last of three
+        mixed += 3 * np.abs(kxyz)
+        for k in (kx, ky, kz):
+            mixed += np.abs(k)
+        return cubic, mixed, mixed
     moved = np.abs(slope_x) + np.abs(slope_y) + np.abs(slope_z)
     moved += 0.5 * (np.abs(turn_x) + np.abs(turn_y) + np.abs(turn_z))
     moved += 0.25 * np.abs(kxyz) * (np.abs(dx * dy) + np.abs(dx * dz) + np.abs(dy * dz))

@@ -128,7 +128,7 @@ def models_of(transfer: TransferFunction, low: float, high: float) -> Models:
         count += block.shape[1]
     blocks.append(_exact_rows(straight, off, unit_distance))
     rows = np.concatenate(blocks, axis=1)
-    visible = [SIGMA0, SIGMA1, SIGMA_OFF, ALPHA0, ALPHA1, JUMP, JUMP_LIGHT]
+    visible = [SIGMA0, SIGMA1, SIGMA_OFF, ALPHA0, ALPHA1, JUMP, JUMP_LIGHT, OPAQUE_BELOW, OPAQUE_ABOVE]
     rows[SEEN] = rows[visible].any(axis=0)
     return Models(
         rows,
