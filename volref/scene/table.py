@@ -17,6 +17,9 @@ STRENGTH = 3  # the channel of extinction or opacity
 # A break is kept if it bends any channel by more than this part of the channel's size there.
 LEAST_BEND = 2.0**-50
 
+# Knots of interpolated opacity further away than this many times the values are cut off all the same.
+FURTHEST = 1e6
+
 # Knots closer than this part of the values are taken for one.
 CLOSE = 2.0**-47
 
@@ -55,8 +58,11 @@ def table_pieces(transfer: TransferFunction, low: float, high: float) -> TablePi
     margin = max(high - low, abs(low), abs(high), 1.0)
     low, high = low - blur, high + blur  # what was taken for one knot may lie on either side of it
     inside = np.flatnonzero((knots >= low) & (knots <= high))
-    start = max(low - margin, *knots[knots < low][-1:], -np.inf)
-    end = min(high + margin, *knots[knots > high][:1], np.inf)
+    # What is clear near an opacity of 1 has its digits at the knots only: there pieces are not cut.
+    beyond = margin if transfer.extinction is not None else FURTHEST * margin
+    below, above = knots[knots < low][-1:], knots[knots > high][:1]
+    start = below[0] if len(below) and low - below[0] <= beyond else low - margin
+    end = above[0] if len(above) and above[0] - high <= beyond else high + margin
     breaks = np.concatenate([[start], knots[inside], [end]])
     outer = [_between(knots, before, at, start, below=False), _between(knots, before, at, end, below=True)]
     left = np.concatenate([outer[0][:, None], at[:, inside]], axis=1)

@@ -84,7 +84,8 @@ def cells_along(
     slack = error.take(ray) * moved + (ARITHMETIC * ROUNDOFF) * size
     slack += np.where(size > 0, ROUNDOFF * np.abs(cubic[0]), 0.0)
     slowest = np.where(directions == 0, np.inf, np.abs(directions)).min(axis=0)
-    share = 2 * error / slowest
+    with np.errstate(over="ignore"):
+        share = 2 * error / slowest
     # A ray along a plane is astray throughout if rounding has put it there.
     on_plane = (directions == 0) & (rests != 0) & (np.abs(origins - np.rint(origins)) <= error)
     share[on_plane.any(axis=0)] = np.inf
@@ -184,7 +185,7 @@ def _between_planes(
     parts = [t_near[:, None], t_far[:, None]]
     furthest = np.maximum(np.abs(t_near), np.abs(t_far))
     for o, d in zip(origins, directions, strict=True):
-        with np.errstate(divide="ignore"):
+        with np.errstate(divide="ignore", over="ignore"):
             inverse = np.where(np.abs(d) * furthest < PARALLEL, 0.0, 1.0 / d)
         ends = o + t_near * d, o + t_far * d
         first = np.ceil(np.minimum(*ends))

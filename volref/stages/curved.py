@@ -119,8 +119,8 @@ def curved_emission(
                     k,
                     dense=bool(dense[chosen[0]]),
                 )
-    most = clear + np.abs(slope) * reach
-    off = np.where(slope == 0, 0.0, np.abs(slope) * slack + 8 * ROUNDOFF * np.where(dense, most, 1.0))
+    most, faint = clear + np.abs(slope) * reach, opacity + np.abs(slope) * reach
+    off = np.where(slope == 0, 0.0, np.abs(slope) * slack + 8 * ROUNDOFF * np.where(dense, most, faint))
     least = clear - np.abs(slope) * reach
     with np.errstate(divide="ignore", invalid="ignore"):
         moved = np.where(off == 0, 0.0, np.where(least > 2 * off, scale * (off / (least - off)), FAR))
