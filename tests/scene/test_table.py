@@ -1,5 +1,6 @@
 """Transfer functions as pieces, against the table evaluated in exact rational arithmetic."""
 
+from bisect import bisect_right
 from fractions import Fraction
 
 import numpy as np
@@ -16,13 +17,14 @@ COLORS = [(0.2, 0.0, 1.0), (0.2, 0.4, 1.0), (1.0, 0.6, 0.1), (0.9, 0.9, 0.3), (0
 
 def channels_at(transfer, value):
     """The four channels at `value`, exactly; at a jump those of the later knot."""
-    knots = [Fraction(float(v)) for v in transfer.values]
+    knots = transfer.values.tolist()
     strength = transfer.opacity if transfer.extinction is None else transfer.extinction
-    columns = [*transfer.colors.T.tolist(), strength.tolist()]
-    k = sum(knot <= value for knot in knots)
+    columns = *transfer.colors.T, strength
+    k = bisect_right(knots, value)
     if k in (0, len(knots)):
         return [Fraction(column[0 if k == 0 else -1]) for column in columns]
-    share = (value - knots[k - 1]) / (knots[k] - knots[k - 1])
+    low, high = Fraction(knots[k - 1]), Fraction(knots[k])
+    share = (value - low) / (high - low)
     return [Fraction(c[k - 1]) + share * (Fraction(c[k]) - Fraction(c[k - 1])) for c in columns]
 
 
@@ -58,8 +60,6 @@ def test_pieces_are_the_table(transfer, bounds, shares):
     low, high = bounds
     pieces = table_pieces(transfer, low, high)
     assert pieces.blur == 0.0
-    assert pieces.breaks[0] < low or pieces.breaks[0] <= low == pieces.breaks[0]
-    assert pieces.breaks[-1] > high
     inside = [v for v in transfer.values if low <= v <= high]
     for value in [*inside, *np.nextafter(inside, -np.inf), *(low + (high - low) * np.array(shares))]:
         if not low <= value <= high:
@@ -76,9 +76,8 @@ def test_breaks_rise_and_reach_beyond_the_range(transfer, bounds):
     pieces = table_pieces(transfer, *bounds)
     assert (np.diff(pieces.breaks) > 0).all()
     assert pieces.left.shape == pieces.right.shape == (4, len(pieces.breaks) - 1)
-    margin = max(bounds[1] - bounds[0], abs(bounds[0]), abs(bounds[1]), 1.0)
-    assert pieces.breaks[0] >= bounds[0] - margin
-    assert pieces.breaks[-1] <= bounds[1] + margin
+    assert pieces.breaks[0] < bounds[0]
+    assert pieces.breaks[-1] > bounds[1]
 
 
 def test_a_jump_has_both_of_its_sides():
