@@ -49,7 +49,9 @@ def assert_model(transfer, models, row, low, high):
     sigma0, sigma1, sigma_off = (rows[k] for k in (column.SIGMA0, column.SIGMA1, column.SIGMA_OFF))
     at_ends = [sigma0 + sigma1 * (end - rows[column.CENTER]) for end in (low, high)]
     greatest = max(float(sigma0), *map(float, at_ends))
-    assert min(at_ends) >= -64 * U * max(greatest, sigma_off)
+    # The centre is rounded, and so is half the width.
+    at_center = 2 * U * abs(sigma1 * rows[column.CENTER])
+    assert min(at_ends) >= -64 * U * max(greatest, sigma_off) - at_center
     brightest = max(1.0, transfer.colors.max())
     for value in map(float, values_between(transfer, low, high)):
         exact = Fraction(value)
