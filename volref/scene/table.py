@@ -17,9 +17,6 @@ STRENGTH = 3  # the channel of extinction or opacity
 # A break is kept if it bends any channel by more than this part of the channel's size there.
 LEAST_BEND = 2.0**-50
 
-# Knots of interpolated opacity further away than this many times the values are cut off all the same.
-FURTHEST = 1e6
-
 # Knots closer than this part of the values are taken for one.
 CLOSE = 2.0**-47
 
@@ -58,11 +55,12 @@ def table_pieces(transfer: TransferFunction, low: float, high: float) -> TablePi
     margin = max(high - low, abs(low), abs(high), 1.0)
     low, high = low - blur, high + blur  # what was taken for one knot may lie on either side of it
     inside = np.flatnonzero((knots >= low) & (knots <= high))
-    # What is clear near an opacity of 1 has its digits at the knots only: there pieces are not cut.
-    beyond = margin if transfer.extinction is not None else FURTHEST * margin
     below, above = knots[knots < low][-1:], knots[knots > high][:1]
-    start = below[0] if len(below) and low - below[0] <= beyond else low - margin
-    end = above[0] if len(above) and above[0] - high <= beyond else high + margin
+    start = below[0] if len(below) and low - below[0] <= margin else low - margin
+    end = above[0] if len(above) and above[0] - high <= margin else high + margin
+    if transfer.extinction is None and _dense(knots, before, at, start, end):
+        # What is clear near an opacity of 1 has its digits at the knots only: no piece is cut.
+        start, end = min([*below, start]), max([*above, end])
     breaks = np.concatenate([[start], knots[inside], [end]])
     outer = [_between(knots, before, at, start, below=False), _between(knots, before, at, end, below=True)]
     left = np.concatenate([outer[0][:, None], at[:, inside]], axis=1)
@@ -82,6 +80,12 @@ def _between(knots: Floats, before: Floats, at: Floats, value: float, *, below: 
     if value - knots[k - 1] < knots[k] - value:
         return np.asarray(at[:, k - 1] + (value - knots[k - 1]) / gap * rise)
     return np.asarray(before[:, k] - (knots[k] - value) / gap * rise)
+
+
+def _dense(knots: Floats, before: Floats, at: Floats, start: float, end: float) -> bool:
+    """Tell whether the opacity is more than 1/2 where pieces are to begin or to end."""
+    ends = _between(knots, before, at, start, below=False), _between(knots, before, at, end, below=True)
+    return any(bool(channels[STRENGTH] > 1 / 2) for channels in ends)
 
 
 def _joined_where_close(

@@ -191,7 +191,10 @@ def rows_of(models: Models, low: Floats, high: Floats) -> Indices:
 
 
 def look_up(models: Models, values: Floats) -> tuple[Floats, Floats, Floats]:
-    """Return a finite bound on extinction, colour (3, m) and its error, for values off by rounding."""
+    """Return a finite bound on extinction, colour (3, m) and its error, for values off by rounding.
+
+    The extinction of what may be opaque is 1e200.
+    """
     slack = NEARBY * np.abs(values)
     row = rows_of(models, values - slack, values + slack)
     rows = models.rows
@@ -201,7 +204,8 @@ def look_up(models: Models, values: Floats) -> tuple[Floats, Floats, Floats]:
     c1, c2 = rows[C1].take(row, axis=1), rows[C2].take(row, axis=1)
     color = rows[C0].take(row, axis=1) + (c1 + c2 * offset) * offset
     off = rows[COLOR_OFF].take(row) + (np.abs(c1) + 2 * np.abs(c2) * reach).max(axis=0) * slack
-    return np.minimum(extinction, models.most_sigma), color, off
+    most = np.where(np.isinf(extinction), 1e200, models.most_sigma) if models.opaque else models.most_sigma
+    return np.minimum(extinction, most), color, off
 
 
 def _divided(table: TablePieces, width: float) -> TablePieces:
@@ -464,7 +468,7 @@ def _jumps(left: Floats, right: Floats, sigma: Floats, hidden: Floats, hidden_co
     brightest = np.maximum(left[:3].max(), right[:3].max())
     clearer = np.minimum(before, after)
     light = np.where(opaque, np.where(np.isfinite(clearer), clearer, 0.0) * brightest, 0.0)
-    light += np.where(opaque, 0.0, color * np.where(opaque, 0.0, np.maximum(before, after)))
+    light += color * np.where(opaque, 0.0, np.maximum(np.maximum(before, after), hidden[1:-1]))
     return np.stack([np.maximum(np.append(0.0, x), np.append(x, 0.0)) for x in (depth, light)])
 
 

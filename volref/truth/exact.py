@@ -131,7 +131,7 @@ def _recentred(
     face, (face - o) / d, is off by 3 u of itself with u the unit roundoff, and by the rest of the origin over
     d.
     """
-    moved, rests, kept = recentred(origins, directions, spans, PAD)
+    moved, rests, kept = recentred(origins, directions, spans, PAD)  # empty spans keep their origins
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         faces = [(face[:, None] + PAD - moved) / directions for face in (prepared.low, prepared.high)]
         errors = np.abs(rests / directions)
@@ -142,12 +142,15 @@ def _recentred(
     near_axis, far_axis = near.argmax(axis=0)[None], far.argmin(axis=0)[None]
     at_near, at_far = (np.take_along_axis(errors, axis, axis=0)[0] for axis in (near_axis, far_axis))
     near, far = near.max(axis=0), far.min(axis=0)
+    at_near, at_far = at_near + 3 * ROUNDOFF * np.abs(near), at_far + 3 * ROUNDOFF * np.abs(far)
     inside = spans.t_far > spans.t_near
-    near = np.where(inside & (spans.t_near > 0), near, kept.t_near)
-    far = np.where(inside & (spans.t_far < distance), far, kept.t_far)
-    far = np.maximum(near, far)
-    ends = Spans(at_near + 3 * ROUNDOFF * np.abs(near), at_far + 3 * ROUNDOFF * np.abs(far))
-    return moved, rests, Spans(near, far), ends
+    # A ray beside the box may touch it: by rounding its span is empty.
+    enters, leaves = np.maximum(near, 0.0), np.minimum(far, distance)
+    touching = ~inside & np.isfinite(spans.t_near) & (enters - at_near <= leaves + at_far)
+    near = np.where(inside & (spans.t_near > 0), near, np.where(touching, enters, kept.t_near))
+    far = np.where(inside & (spans.t_far < distance), far, np.where(touching, enters, kept.t_far))
+    ends = Spans(*(np.where(inside | touching, error, 0.0) for error in (at_near, at_far)))
+    return moved, rests, Spans(near, np.maximum(near, far)), ends
 
 
 def _error_of_ends(
@@ -166,7 +169,7 @@ def _error_of_ends(
     the image itself, at the far end what lies behind, seen through all the rest.
     """
     error = np.zeros(len(done.bound))
-    inside = np.flatnonzero(spans.t_far > spans.t_near)
+    inside = np.flatnonzero(ends.t_near + ends.t_far > 0)
     low, high = prepared.low[:, None] + PAD, prepared.high[:, None] + PAD
     near_end = spans.t_near, ends.t_near, done.rgba, np.ones(len(error))
     far_end = spans.t_far, ends.t_far, behind, done.clear

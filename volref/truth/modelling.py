@@ -59,9 +59,7 @@ def modelled(models: Models, pieces: Pieces, astray: float, tolerance: float) ->
     if astray == 0:  # all cells are alike
         astray_sigma = 0.0
     offset, reach, density, depth_error, light_error = _extinction(models, pieces, row, astray_sigma)
-    color, slopes, bend, change = _color(models, row, offset, reach)
-    steepest_color = change.max(axis=0)
-    steepest_color /= np.maximum(reach, 1e-300)
+    color, slopes, bend, change, steepest_color = _color(models, row, offset, reach, pieces.slack)
     color_error = steepest_color * pieces.slack
     color_error += models.rows[column.COLOR_OFF].take(row)
     _beside(models, pieces, row, depth_error, color_error, light_error)
@@ -138,12 +136,12 @@ def _extinction(
 
 
 def _color(
-    models: Models, row: Indices, offset: Floats, reach: Floats
-) -> tuple[Floats, Floats, Floats | None, Floats]:
+    models: Models, row: Indices, offset: Floats, reach: Floats, slack: Floats
+) -> tuple[Floats, Floats, Floats | None, Floats, Floats]:
     """Return the models' colours at the middle values and their derivatives, (3, n) each.
 
-    Half the second derivatives follow; they are None where all rows are straight.  Last, how far the colour
-    leaves that of the middle.
+    Half the second derivatives follow; they are None where all rows are straight.  Then, how far the colour
+    leaves that of the middle (3, n), and the steepest it is in any channel within `slack` of a value (n,).
     """
     rows = models.rows
     slopes = rows[column.C1].take(row, axis=1)
@@ -151,18 +149,20 @@ def _color(
     if not models.bent:
         color += slopes * offset
         change = np.abs(slopes)
+        steepest = change.max(axis=0)
         change *= reach
-        return color, slopes, None, change
+        return color, slopes, None, change, steepest
     bend = rows[column.C2].take(row, axis=1)
     step = bend * offset
     slopes += step
     color += slopes * offset
     slopes += step
-    change = np.abs(bend)
+    change, more = np.abs(slopes), np.abs(bend)
+    steepest = (change + more * (2 * (reach + slack))).max(axis=0)
+    more *= reach
+    change += more
     change *= reach
-    change += np.abs(slopes)
-    change *= reach
-    return color, slopes, bend, change
+    return color, slopes, bend, change, steepest
 
 
 def _rows(models: Models, pieces: Pieces) -> Indices:
