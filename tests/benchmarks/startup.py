@@ -1,4 +1,4 @@
-"""How long volref takes to start: medians over processes.  Run: python tests/bench/startup.py [runs]"""
+"""How long volref takes to start: medians over processes.  Run: python tests/benchmarks/startup.py [runs]"""
 
 import statistics
 import subprocess

@@ -1,9 +1,9 @@
 """Is "auto" near the fastest?  Error against time on the precision suites, and what the choice costs.
 
-    python -m tests.bench.frontier                      all suites and the chest CT: about an hour
-    python -m tests.bench.frontier smooth spiky         some of them
-    python -m tests.bench.frontier --size 48x36 --budget 60
-    python -m tests.bench.frontier --certified          certified methods only: a few minutes
+    python -m tests.benchmarks.frontier                      all suites and the chest CT: about an hour
+    python -m tests.benchmarks.frontier smooth spiky         some of them
+    python -m tests.benchmarks.frontier --size 48x36 --budget 60
+    python -m tests.benchmarks.frontier --certified          certified methods only: a few minutes
 
 Certified `auto` is compared with the fastest certified image whose bound meets the same tolerance;
 `certified=False` with the fastest of all methods whose error does, by hindsight.  Times are CPU seconds on

@@ -1,4 +1,4 @@
-"""CPU time of the z-buffer at 512 x 512: `python -m tests.bench.zbuffer`.
+"""CPU time of the z-buffer at 512 x 512: `python -m tests.benchmarks.zbuffer`.
 
 Prints, for 20 thousand and 300 thousand triangles, the CPU seconds of projection, clipping test and
 z-buffer together, the same with distances and colours, nanoseconds per fragment, and the ratio to one

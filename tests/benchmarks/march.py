@@ -1,4 +1,4 @@
-"""CPU time of the marcher: `python -m tests.bench.march [SIDE]`.
+"""CPU time of the marcher: `python -m tests.benchmarks.march [SIDE]`.
 
 A smooth 128^3 volume (float32), a 256-knot table, 512 x 512 pixels, half-voxel steps, float64, one thread.
 Prints CPU seconds, nanoseconds per nominal sample (what a marcher without short cuts would take) and per
