@@ -191,10 +191,7 @@ def rows_of(models: Models, low: Floats, high: Floats) -> Indices:
 
 
 def look_up(models: Models, values: Floats) -> tuple[Floats, Floats, Floats]:
-    """Return a finite bound on extinction, colour (3, m) and its error, for values off by rounding.
-
-    The extinction of what may be opaque is 1e200.
-    """
+    """Return a bound on extinction, up to 1e200, colour (3, m) and its error, for values off by rounding."""
     slack = NEARBY * np.abs(values)
     row = rows_of(models, values - slack, values + slack)
     rows = models.rows
@@ -204,8 +201,7 @@ def look_up(models: Models, values: Floats) -> tuple[Floats, Floats, Floats]:
     c1, c2 = rows[C1].take(row, axis=1), rows[C2].take(row, axis=1)
     color = rows[C0].take(row, axis=1) + (c1 + c2 * offset) * offset
     off = rows[COLOR_OFF].take(row) + (np.abs(c1) + 2 * np.abs(c2) * reach).max(axis=0) * slack
-    most = np.where(np.isinf(extinction), 1e200, models.most_sigma) if models.opaque else models.most_sigma
-    return np.minimum(extinction, most), color, off
+    return np.minimum(extinction, 1e200), color, off
 
 
 def _divided(table: TablePieces, width: float) -> TablePieces:

@@ -142,15 +142,31 @@ def _recentred(
     near_axis, far_axis = near.argmax(axis=0)[None], far.argmin(axis=0)[None]
     at_near, at_far = (np.take_along_axis(errors, axis, axis=0)[0] for axis in (near_axis, far_axis))
     near, far = near.max(axis=0), far.min(axis=0)
-    at_near, at_far = at_near + 3 * ROUNDOFF * np.abs(near), at_far + 3 * ROUNDOFF * np.abs(far)
     inside = spans.t_far > spans.t_near
-    # A ray beside the box may touch it: by rounding its span is empty.
-    enters, leaves = np.maximum(near, 0.0), np.minimum(far, distance)
-    touching = ~inside & np.isfinite(spans.t_near) & (enters - at_near <= leaves + at_far)
-    near = np.where(inside & (spans.t_near > 0), near, np.where(touching, enters, kept.t_near))
-    far = np.where(inside & (spans.t_far < distance), far, np.where(touching, enters, kept.t_far))
-    ends = Spans(*(np.where(inside | touching, error, 0.0) for error in (at_near, at_far)))
-    return moved, rests, Spans(near, np.maximum(near, far)), ends
+    # Ends at the origin or at a surface are what they are.
+    at_face = spans.t_near > 0, spans.t_far < distance
+    near, far = (
+        np.where(inside & at_face[0], near, kept.t_near),
+        np.where(inside & at_face[1], far, kept.t_far),
+    )
+    at_near = np.where(inside & at_face[0], at_near + 3 * ROUNDOFF * np.abs(near), 0.0)
+    at_far = np.where(inside & at_face[1], at_far + 3 * ROUNDOFF * np.abs(far), 0.0)
+    near, at_near = _touching(spans, at_face, near, at_near)
+    return moved, rests, Spans(near, np.maximum(near, far)), Spans(at_near, at_far)
+
+
+def _touching(
+    spans: Spans, at_face: tuple[Booleans, Booleans], near: Floats, at_near: Floats
+) -> tuple[Floats, Floats]:
+    """Return near and its error with those of rays that touch the box, although their span is empty.
+
+    Their chord is at most what rounding may have taken off it.
+    """
+    with np.errstate(invalid="ignore"):
+        chord = spans.t_far - spans.t_near
+        chord += 3 * ROUNDOFF * (at_face[0] * np.abs(spans.t_near) + at_face[1] * np.abs(spans.t_far))
+    touching = (spans.t_far <= spans.t_near) & np.isfinite(spans.t_near) & (chord >= 0)
+    return np.where(touching, spans.t_near, near), np.where(touching, chord, at_near)
 
 
 def _error_of_ends(
@@ -170,12 +186,15 @@ def _error_of_ends(
     """
     error = np.zeros(len(done.bound))
     inside = np.flatnonzero(ends.t_near + ends.t_far > 0)
+    # Where a ray has pieces, they know whether they may be opaque.
+    most = np.where(spans.t_far > spans.t_near, prepared.models.most_sigma, np.inf)[inside]
     low, high = prepared.low[:, None] + PAD, prepared.high[:, None] + PAD
     near_end = spans.t_near, ends.t_near, done.rgba, np.ones(len(error))
     far_end = spans.t_far, ends.t_far, behind, done.clear
     for t, off_by, arriving, seen in (near_end, far_end):
         position = np.clip(origins[:, inside] + t[inside] * directions[:, inside], low, high)
         extinction, color, off = look_up(prepared.models, trilinear(prepared.samples, position, Workspace()))
+        extinction = np.minimum(extinction, most)
         contrast = np.abs(color.T - arriving[inside, :3]).max(axis=1) + off
         contrast = np.maximum(contrast, 1.0 - arriving[inside, 3]) + done.bound[inside]
         error[inside] += np.minimum(off_by[inside] * extinction, 1.0) * contrast * seen[inside]
