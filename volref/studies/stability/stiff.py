@@ -292,8 +292,8 @@ CASES = (
         "Is a wall on the very face where rays enter a volume of extinction 1000 in front of it?",
         "the wall's colour: the span up to it has no length",
         "a shader that takes at least one step, of half a voxel",
-        "the distances of face and wall, 18, are off by 8 ulp each, times the extinction.  exact: beside that, "
-        "its certificate, itself at most 3/2 eps of the distance times the extinction",
+        "the distances of face and wall, 18, are off by 8 ulp each, times the extinction.  exact: beside "
+        "that its certificate, itself at most 3/2 eps of the distance times the extinction",
         _surface_on_the_entry,
     ),
     Case(

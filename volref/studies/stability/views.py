@@ -182,7 +182,7 @@ CASES = (
         "0: the chord is a point, and the image continuous",
         "the shader: float32 chords of 1e-6",
         "the ray is off by 8 eps of its length, 10, a wedge makes at most 11 times that a chord, and the "
-        "extinction multiplies it.  exact: beside that, its certificate, itself at most 3 eps of the distance, "
+        "extinction multiplies it.  exact: its certificate, at most 3 eps of the distance, "
         "5, times the extinction: no shorter chord can be told from none",
         _edges_and_corners,
     ),
