@@ -261,12 +261,12 @@ def test_ctrl_c_ends_in_one_line_and_leaves_no_file(tmp_path):
     before = sorted(tmp_path.iterdir())
     out = tmp_path / "image.npy"
     program = (
-        "import sys, volref.cli, volref.truth.rendering as rendering\n"
-        "march = rendering.march_chunk\n"
+        "import sys, volref.cli, volref.truth.integration as integration\n"
+        "march = integration.march_chunk\n"
         "def told(*words):\n"
         "    print('marching', flush=True)\n"
         "    return march(*words)\n"
-        "rendering.march_chunk = told\n"
+        "integration.march_chunk = told\n"
         "sys.exit(volref.cli.main())\n"
     )
     words = ["render", str(tmp_path / "scene.json"), "-o", str(out), "--step", "0.005", "-j", "1"]

@@ -13,7 +13,7 @@ from tests.scenes import camera_towards, colorful_transfer, rough_scene, rough_v
 from volref import planning
 from volref.phantoms import scenes as phantoms
 from volref.phantoms import transfer as phantom_tables
-from volref.truth import rendering
+from volref.truth import integration, rendering
 
 EPS = np.finfo(np.float64).eps
 
@@ -292,7 +292,7 @@ def test_an_exception_in_a_thread_ends_the_rendering(monkeypatch, threads):
     def fail(*_):
         raise MemoryError
 
-    monkeypatch.setattr(rendering, "march_chunk", fail)
+    monkeypatch.setattr(integration, "march_chunk", fail)
     monkeypatch.setattr(rendering, "RAYS_PER_CHUNK", 8)  # more chunks than threads
     with pytest.raises(MemoryError):
         march(rough_scene(12, 8), threads=threads)

@@ -10,7 +10,7 @@ import pytest
 import volref as vr
 from tests.scenes import rough_scene, sparse_scene
 from volref.phantoms.meshes import sphere_mesh
-from volref.truth import rendering
+from volref.truth import crew, integration, rendering
 from volref.truth.choosing import Choice
 from volref.truth.exact import integrate_pixels
 
@@ -112,7 +112,8 @@ def until(scene, monkeypatch):
         clock = Clock()
         with monkeypatch.context() as patch:
             patch.setattr(rendering, "time", clock)
-            patch.setattr(rendering, "integrate_pixels", clock.timed)
+            patch.setattr(crew, "time", clock)
+            patch.setattr(integration, "integrate_pixels", clock.timed)
             return vr.render(scene, tolerance=1e-8, max_seconds=seconds, threads=1)
 
     return render
@@ -162,7 +163,7 @@ def test_an_exception_in_a_tile_ends_the_rendering(monkeypatch):
     def fail(*_):
         raise MemoryError
 
-    monkeypatch.setattr(rendering, "integrate_pixels", fail)
+    monkeypatch.setattr(integration, "integrate_pixels", fail)
     for threads in (1, 2):
         with pytest.raises(MemoryError):
             vr.render(sparse_scene(size=64), method="exact", threads=threads)

@@ -30,7 +30,7 @@ def _run(options: argparse.Namespace) -> int:
 
 def _environment() -> dict[str, Any]:
     from volref import __version__
-    from volref.truth.rendering import available_cores
+    from volref.truth.crew import available_cores
 
     return {
         "volref": __version__,

@@ -72,6 +72,17 @@ def read_nrrd(path: str | Path, max_bytes: int) -> tuple[Numbers, dict[str, Any]
             return _read_samples(data_file, stream, header, size, max_bytes), place
 
 
+def is_detached(path: Path) -> bool:
+    """Tell whether a NRRD file names another one that holds its samples."""
+    with path.open("rb") as stream:
+        for line in stream:
+            if not line.strip():
+                return False
+            if line.lower().startswith((b"data file:", b"datafile:")):
+                return True
+    return False
+
+
 def placement_of_header(file: Path, header: dict[str, Any]) -> dict[str, Any]:
     """Return spacing, origin, direction and centering of a NRRD header, after checking it holds one field."""
     _check_scalar(file, header)

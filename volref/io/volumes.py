@@ -7,6 +7,7 @@ beside it (keyword arguments, then a JSON file called `<name>.json`, as in `head
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple, TypeAlias
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -17,7 +18,7 @@ from volref.io.documents import whole_numbers
 from volref.io.guard import DEFAULT_MAX_BYTES, existing_file, nearest, one_line, read_json, wrapped
 from volref.io.nifti import read_nifti
 from volref.io.npy import chosen_array, npz_headers, read_npy, read_npz
-from volref.io.nrrd import read_nrrd
+from volref.io.nrrd import is_detached, read_nrrd
 from volref.io.placement import GEOMETRY, SIGNS, placement_of_affine
 from volref.io.raw import read_raw
 from volref.scene.volume import Volume
@@ -89,9 +90,49 @@ def load_volume(
         raise FormatError(message + f"pass them or write them to {file.name}.json")
     own = {name: stated[name] for name in reader.keys if name in stated}
     limit = whole_number("max_bytes", max_bytes, low=1, high=2**62)
+    origin = Origin(file.resolve(), file_state(file), nan, own)
     values, said = reader.read(file, own, limit)
     placed = {**said, **{name: stated[name] for name in GEOMETRY if name in stated}}
-    return Volume(values, nan=nan, **placed)
+    volume = Volume(values, nan=nan, **placed)
+    if reader.kind != "NRRD" or not is_detached(file):
+        _ORIGINS[volume] = origin
+    return volume
+
+
+class Origin(NamedTuple):
+    """The one file that a volume was loaded from, its state then, and how its samples were read."""
+
+    path: Path
+    state: tuple[int, ...]
+    nan: str | float
+    own: Statement
+
+
+# Where volumes that live were loaded from.
+_ORIGINS: WeakKeyDictionary[Volume, Origin] = WeakKeyDictionary()
+
+
+def origin_of(volume: Volume) -> Origin | None:
+    """Return where a volume was loaded from, None if it was not, or from several files."""
+    return _ORIGINS.get(volume)
+
+
+def read_again(path: Path, nan: str | float, own: Statement, placement: Statement) -> Volume:
+    """Return the volume that `load_volume` returned before, whatever the file and those beside it say now.
+
+    Raises
+    ------
+    FormatError, SceneError
+        If the file cannot be read.
+    """
+    values, _ = _reader_of(path).read(existing_file(path), own, 2**62)
+    return Volume(values, nan=nan, **placement)
+
+
+def file_state(path: Path) -> tuple[int, ...]:
+    """Return what changes when a file is written to: device, number, size and time."""
+    found = path.stat()
+    return found.st_dev, found.st_ino, found.st_size, found.st_mtime_ns
 
 
 def is_volume_path(path: Path) -> bool:

@@ -21,8 +21,9 @@ from volref.stages.classify import classify, segment_opacity
 from volref.stages.rays import pixel_rays
 from volref.stages.sampling import PAD, trilinear
 from volref.stages.spans import box_spans, cut_at_surface
+from volref.truth.canvas import light_behind
 from volref.truth.march import Field, field_of, segments_of
-from volref.truth.rendering import decide, light_behind
+from volref.truth.rendering import decide
 from volref.truth.surfaces import visible_surface
 from volref.workspace import Workspace
 

@@ -17,9 +17,9 @@ from volref.errors import SceneError
 from volref.scene.scene import Scene
 from volref.scene.transform import transform_directions, transform_points
 from volref.stages.rays import pixel_rays
+from volref.truth.canvas import light_behind
 from volref.truth.digits.integral import ray_integral
 from volref.truth.digits.lattice import exact_point, exact_span
-from volref.truth.rendering import light_behind
 from volref.truth.result import Render
 from volref.truth.surfaces import visible_surface
 

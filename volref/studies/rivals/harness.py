@@ -20,7 +20,7 @@ from volref.stages.sampling import PAD
 from volref.stages.spans import box_spans, cut_at_surface
 from volref.studies.rivals.medium import Bundle, Integrator, Medium, medium_of
 from volref.studies.rivals.table import Rival
-from volref.truth.rendering import light_behind
+from volref.truth.canvas import light_behind
 from volref.truth.surfaces import visible_surface
 from volref.workspace import Workspace
 

@@ -1,0 +1,78 @@
+"""The image while it is being filled in.
+
+R pixels of a part; H, W the image.  Images are kept flat, and whatever is needed beside the result is made by
+parts: a 4096 x 4096 image of four channels takes 512 MiB.
+"""
+
+import numpy as np
+
+from volref.arrays import Floats, Indices
+from volref.records import Surface
+from volref.scene.scene import Scene
+from volref.truth.parts import runs
+
+# Pixels that are filled with what lies behind the volume, or with what it could be, at a time.
+PIXELS_AT_ONCE = 1 << 16
+
+
+class Canvas:
+    """Pixels being filled in: rgba (H W, 4), bound (H W,), distance (H W,), and the work spent so far.
+
+    A pixel that nothing is known of has an infinite bound.
+    """
+
+    def __init__(self, scene: Scene, surface: Surface | None) -> None:
+        pixels = scene.width * scene.height
+        self.scene, self.surface = scene, surface
+        self.distance = np.full(pixels, np.inf) if surface is None else surface.distance.reshape(-1)
+        self.rgba, self.bound = np.zeros((pixels, 4)), np.full(pixels, np.inf)
+        self.samples = 0
+
+    def behind(self, pixels: Indices) -> Floats:
+        """Return what lies behind the volume, (R, 4)."""
+        return light_behind(self.scene, self.surface, pixels)
+
+    def show_what_lies_behind(self) -> None:
+        """Finish the image of a scene in which the volume does not show."""
+        self.bound[:] = 0.0
+        if self.surface is None:
+            self.rgba[:] = self.scene.background
+            return
+        parts = runs(len(self.bound), PIXELS_AT_ONCE)
+        for pixels in map(parts.pixels, range(parts.count)):
+            self.rgba[pixels] = self.behind(pixels)
+
+    def show_anything(self) -> None:
+        """Set each pixel midway between all that it could be, and the bound to half of that."""
+        parts = runs(len(self.bound), PIXELS_AT_ONCE)
+        for pixels in map(parts.pixels, range(parts.count)):
+            self.rgba[pixels], self.bound[pixels] = _anything(self.scene, self.behind(pixels))
+
+    def put(
+        self, pixels: Indices, rgba: Floats, bound: Floats, samples: int, *, only_better: bool = False
+    ) -> None:
+        """Fill in `pixels`, or those of them that were not known better."""
+        self.samples += samples
+        if only_better:
+            better = bound <= self.bound[pixels]
+            pixels, rgba, bound = pixels[better], rgba[better], bound[better]
+        self.rgba[pixels], self.bound[pixels] = rgba, bound
+
+
+def light_behind(scene: Scene, surface: Surface | None, pixels: Indices) -> Floats:
+    """Return the premultiplied RGBA (R, 4) behind the volume at `pixels`: the surface, or the background."""
+    behind = np.tile(np.array(scene.background), (len(pixels), 1))
+    if surface is not None:
+        hit = surface.mesh.reshape(-1)[pixels] >= 0
+        behind[hit, :3] = surface.color.reshape(-1, 3)[pixels[hit]]
+        behind[hit, 3] = 1.0
+    return behind
+
+
+def _anything(scene: Scene, behind: Floats) -> tuple[Floats, Floats]:
+    """Return pixels (R, 4) midway between all that the volume could show, and their bound (R,)."""
+    if scene.volume is None or scene.transfer is None:
+        return behind.copy(), np.zeros(len(behind))
+    most = np.maximum(behind, np.append(scene.transfer.colors.max(axis=0), 1.0))
+    least = np.append(np.zeros((len(behind), 3)), behind[:, 3:], axis=1)
+    return (most + least) / 2, (most - least).max(axis=1) / 2

@@ -1,0 +1,97 @@
+"""Work for other processes: what is sent to them, and what they do with it.
+
+An errand goes with every task and is small: the volume by reference; transfer function, camera and plan as
+they are.  A process reads the volume and makes it ready once, and keeps the last ones.
+"""
+
+import dataclasses
+import threading
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from volref.arrays import Floats, Indices
+from volref.io.references import Folder, Message, VolumeReference, fetch_volume, pack, refer_to_volume, unpack
+from volref.planning import Plan
+from volref.scene.scene import Scene
+from volref.truth.canvas import light_behind
+from volref.truth.integration import Integrated, Integration
+
+
+@dataclass(frozen=True)
+class Errand:
+    """An `Integration` on its way to another process; equal errands are the same work."""
+
+    volume: VolumeReference
+    rest: Message
+
+
+def errand_of(integration: Integration, folder: Folder) -> Errand:
+    """Return the errand of an integration whose scene has a volume; files go to `folder` if they must."""
+    scene, plan = integration.scene, integration.plan
+    assert scene.volume is not None
+    # Meshes stay: where they end the rays, and what colour they have, goes with each task.
+    view = scene.transfer, scene.camera, scene.width, scene.height, scene.background
+    decided = {
+        field.name: getattr(plan, field.name) for field in dataclasses.fields(plan) if field.name != "scene"
+    }
+    message = pack((*view, decided), folder)
+    return Errand(refer_to_volume(scene.volume, folder), message)
+
+
+def run_errand(
+    errand: Errand,
+    parts: Sequence[Indices],
+    distance: Floats | None,
+    behind: Floats | None,
+    tolerance: float,
+) -> Integrated:
+    """Integrate `parts`, each by itself, and return their R pixels one after the other.
+
+    distance (R,) and behind (R, 4) are of all parts; None: there is no surface, only the background.
+
+    Raises
+    ------
+    FormatError
+        If a file of the errand cannot be read here, or holds something else by now.
+    """
+    integration = _integration(errand)
+    done, first = [], 0
+    for pixels in parts:
+        its = slice(first, first := first + len(pixels))
+        ends = np.full(len(pixels), np.inf) if distance is None else distance[its]
+        light = light_behind(integration.scene, None, pixels) if behind is None else behind[its]
+        done.append(integration.integrate(pixels, ends, light, tolerance))
+    return Integrated(
+        np.concatenate([part.rgba for part in done]),
+        np.concatenate([part.bound for part in done]),
+        sum(part.samples for part in done),
+        done[0].worker,
+    )
+
+
+# A process may have several threads, as those of Dask have: one of them reads, the others wait for it.
+_READING = threading.Lock()
+
+
+def _integration(errand: Errand) -> Integration:
+    errand.volume.file.checked()  # also if it was read before
+    with _READING:
+        return _made_ready(errand)
+
+
+@lru_cache(maxsize=2)
+def _made_ready(errand: Errand) -> Integration:
+    transfer, camera, width, height, background, decided = unpack(errand.rest)
+    scene = Scene(fetch_volume(errand.volume), transfer, camera, width, height, (), background)
+    integration = Integration(scene, Plan(scene=scene, **decided))
+    integration.make_ready()
+    return integration
+
+
+def forget() -> None:
+    """Let go of the volumes that this process kept."""
+    _made_ready.cache_clear()
+    fetch_volume.cache_clear()

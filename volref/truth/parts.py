@@ -1,0 +1,63 @@
+"""An image in parts: the pixels that are worked on together."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from volref.arrays import Indices
+from volref.scene.scene import Scene
+
+# The exact integrator takes the rays of a tile together: they go through the same cells.
+TILE_WIDTH, TILE_HEIGHT = 32, 16
+
+
+@dataclass(frozen=True, eq=False)
+class Parts:
+    """Some parts of an image; `pixels` makes the indices of part i, in 0..count - 1, when they are needed.
+
+    The indices of all parts of a large image would take as much memory as two of its channels.
+    """
+
+    count: int
+    pixels: Callable[[int], Indices]
+
+    def only(self, chosen: list[int]) -> "Parts":
+        """Return the parts with the numbers `chosen`."""
+        return Parts(len(chosen), lambda i: self.pixels(chosen[i]))
+
+    def grouped(self, size: int) -> list[range]:
+        """Return the numbers of the parts in runs of `size`."""
+        return [range(first, min(first + size, self.count)) for first in range(0, self.count, size)]
+
+
+def runs(pixels: int, length: int) -> Parts:
+    """Return `pixels` pixels in runs of `length`.
+
+    Examples
+    --------
+    >>> parts = runs(5, 2)
+    >>> [parts.pixels(i).tolist() for i in range(parts.count)]
+    [[0, 1], [2, 3], [4]]
+    """
+    return Parts(
+        -(-pixels // length), lambda i: np.arange(i * length, min((i + 1) * length, pixels), dtype=np.intp)
+    )
+
+
+def cut(chosen: Indices, length: int) -> Parts:
+    """Return the pixels `chosen` in runs of `length`."""
+    return Parts(-(-len(chosen) // length), lambda i: chosen[i * length : (i + 1) * length])
+
+
+def tiles(scene: Scene) -> Parts:
+    """Return the pixels of the image in tiles of TILE_WIDTH x TILE_HEIGHT, smaller where the image ends."""
+    across, down = -(-scene.width // TILE_WIDTH), -(-scene.height // TILE_HEIGHT)
+
+    def pixels(number: int) -> Indices:
+        row, column = divmod(number, across)
+        y = np.arange(row * TILE_HEIGHT, min((row + 1) * TILE_HEIGHT, scene.height), dtype=np.intp)
+        x = np.arange(column * TILE_WIDTH, min((column + 1) * TILE_WIDTH, scene.width), dtype=np.intp)
+        return np.asarray(y[:, None] * scene.width + x).ravel()
+
+    return Parts(across * down, pixels)
