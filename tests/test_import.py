@@ -7,7 +7,7 @@ import pytest
 
 import volref
 
-DEAR = ("scipy", "trimesh", "colour", "PIL", "matplotlib", "tqdm", "nibabel", "nrrd")
+DEAR = ("scipy", "trimesh", "colour", "PIL", "matplotlib", "tqdm", "nibabel", "nrrd", "distributed")
 
 HELP = "from volref.cli import main; main(['--help']); main(['render', '--help'])"
 

@@ -5,6 +5,7 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from volref.cli.machines import add_dask, executor_at
 from volref.cli.options import (
     accuracy,
     add_accuracy,
@@ -52,6 +53,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         help="integrate N random rays again at 30 digits, by another path, and compare (extra 'verify')",
     )
     add_work(parser)
+    add_dask(parser)
     add_force(parser)
     add_json(parser)
 
@@ -62,10 +64,11 @@ def _run(options: argparse.Namespace) -> int:
     targets = [Path(name) for name in options.output]
     _check_targets(targets, force=options.force)
     scene = read_scene(options)
-    with progress("render", quiet=options.quiet) as show:
+    with executor_at(options.dask) as executor, progress("render", quiet=options.quiet) as show:
         out = render(
             scene,
             threads=options.threads,
+            executor=executor,
             max_seconds=options.max_seconds,
             progress=show,
             **accuracy(options),
@@ -163,6 +166,7 @@ VERB = Verb(
         ("render scene.json -o fine.npy --tolerance 1e-9", "a stricter tolerance"),
         ("render scene.json -o quick.png --max-seconds 5", "what can be certified in five seconds"),
         ("render scene.json -o look.png --step 1 --tolerance 1", "a quick march, its error estimated"),
+        ("render scene.json -o image.npy --dask local:4", "with four processes of this machine"),
         ("render scene.json -o image.npy --verify 64", "with 64 of its rays checked at 30 digits"),
     ),
     _arguments,

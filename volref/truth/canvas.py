@@ -12,7 +12,7 @@ from volref.scene.scene import Scene
 from volref.truth.parts import runs
 
 # Pixels that are filled with what lies behind the volume, or with what it could be, at a time.
-PIXELS_AT_ONCE = 1 << 16
+PIXELS_AT_ONCE = 1 << 14
 
 
 class Canvas:
@@ -31,6 +31,13 @@ class Canvas:
     def behind(self, pixels: Indices) -> Floats:
         """Return what lies behind the volume, (R, 4)."""
         return light_behind(self.scene, self.surface, pixels)
+
+    def all_behind(self) -> Floats:
+        """Return what lies behind the volume at every pixel, (H W, 4), read-only."""
+        pixels = len(self.bound)
+        if self.surface is None:
+            return np.broadcast_to(np.array(self.scene.background), (pixels, 4))
+        return self.behind(np.arange(pixels))
 
     def show_what_lies_behind(self) -> None:
         """Finish the image of a scene in which the volume does not show."""

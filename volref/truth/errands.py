@@ -5,6 +5,8 @@ they are.  A process reads the volume and makes it ready once, and keeps the las
 """
 
 import dataclasses
+import importlib
+import socket
 import threading
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,6 +15,7 @@ from functools import lru_cache
 import numpy as np
 
 from volref.arrays import Floats, Indices
+from volref.errors import FormatError
 from volref.io.references import Folder, Message, VolumeReference, fetch_volume, pack, refer_to_volume, unpack
 from volref.planning import Plan
 from volref.scene.scene import Scene
@@ -24,6 +27,7 @@ from volref.truth.integration import Integrated, Integration
 class Errand:
     """An `Integration` on its way to another process; equal errands are the same work."""
 
+    versions: str
     volume: VolumeReference
     rest: Message
 
@@ -38,7 +42,7 @@ def errand_of(integration: Integration, folder: Folder) -> Errand:
         field.name: getattr(plan, field.name) for field in dataclasses.fields(plan) if field.name != "scene"
     }
     message = pack((*view, decided), folder)
-    return Errand(refer_to_volume(scene.volume, folder), message)
+    return Errand(_versions(), refer_to_volume(scene.volume, folder), message)
 
 
 def run_errand(
@@ -55,7 +59,8 @@ def run_errand(
     Raises
     ------
     FormatError
-        If a file of the errand cannot be read here, or holds something else by now.
+        If a file of the errand cannot be read here, or holds something else by now, or this is another
+        version of volref or NumPy.
     """
     integration = _integration(errand)
     done, first = [], 0
@@ -77,6 +82,9 @@ _READING = threading.Lock()
 
 
 def _integration(errand: Errand) -> Integration:
+    if errand.versions != _versions():
+        message = f"workers must have {errand.versions} as their client has, got {_versions()} on "
+        raise FormatError(message + f"{socket.gethostname()}; install the same versions everywhere")
     errand.volume.file.checked()  # also if it was read before
     with _READING:
         return _made_ready(errand)
@@ -89,6 +97,12 @@ def _made_ready(errand: Errand) -> Integration:
     integration = Integration(scene, Plan(scene=scene, **decided))
     integration.make_ready()
     return integration
+
+
+def _versions() -> str:
+    """Return what the last digits of an image depend on."""
+    volref = importlib.import_module("volref")  # an import would load what lies above this layer
+    return f"volref {volref.__version__} and NumPy {np.__version__}"
 
 
 def forget() -> None:

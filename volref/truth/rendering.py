@@ -105,8 +105,8 @@ def _draw(scene: Scene, plan: Plan, canvas: Canvas, crew: Crew) -> tuple[str, Pl
         return "estimate", plan
     integration = Integration(scene, plan)
     if plan.method == "auto":
-        behind = canvas.behind(np.arange(len(canvas.bound)))
-        choice = choose(scene, plan, integration.field, integration.prepared, canvas.distance, behind)
+        around = canvas.distance, canvas.all_behind()
+        choice = choose(scene, plan, integration.field, integration.prepared, *around)
         if choice is not None:
             return "estimate", _march_then_mend(integration, choice, canvas, crew)
     _draw_exactly(integration, canvas, crew)
@@ -118,7 +118,8 @@ def _march_then_mend(integration: Integration, choice: Choice, canvas: Canvas, c
     scene, plan = integration.scene, choice.plan
     crew.draw(canvas, Integration(scene, plan), crew.runs(len(canvas.bound), RAYS_PER_CHUNK))
     around = around_each(canvas.bound.reshape(scene.height, scene.width))
-    canvas.bound[:] = choice.factor * around.reshape(-1) + plan.termination
+    np.multiply(around.reshape(-1), choice.factor, out=canvas.bound)
+    canvas.bound += plan.termination
     left = np.flatnonzero(canvas.bound > plan.tolerance)
     crew.draw(canvas, integration, cut(left, TILE_WIDTH * TILE_HEIGHT), plan.tolerance)
     reason = f"marched, its estimates scaled by {choice.factor:.3g} after tiles integrated exactly; "
