@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from volref.errors import FormatError
+from volref.io.block_cache import cache_path
 from volref.io.documents import check_format
 from volref.io.guard import DEFAULT_MAX_BYTES, existing_file, one_line, read_json
 from volref.io.images import read_image
@@ -42,7 +43,9 @@ def describe_file(
     kind = "volume" if statement else _kind_of(file, max_bytes)
     about: dict[str, Any] = {"kind": kind, "file": file.name, "file_bytes": file.stat().st_size}
     if kind == "volume":
-        return about | describe_volume(load_volume(file, max_bytes=max_bytes, **told))
+        beside = cache_path(file.resolve())
+        kept = {"block_ranges": beside.name} if beside.is_file() else {}
+        return about | describe_volume(load_volume(file, max_bytes=max_bytes, **told)) | kept
     if kind == "mesh":
         return about | {"meshes": [describe_mesh(mesh) for mesh in load_meshes(file, max_bytes=max_bytes)]}
     if kind == "scene":

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 from volref.arrays import Numbers, one_of, whole_number
 from volref.errors import FormatError
 from volref.io.atomic import atomic_path
+from volref.io.block_cache import keep_beside
 from volref.io.guard import DEFAULT_MAX_BYTES, check_held, check_memory, existing_file, wrapped
 from volref.scene.volume import IDENTITY, Volume
 
@@ -58,7 +59,9 @@ def load_raw(
         If a statement breaks a rule of the scene model.
     """
     values = read_raw(path, size, dtype, byte_order, skip, max_bytes)
-    return Volume(values, spacing, origin, direction, centering, nan=nan)
+    volume = Volume(values, spacing, origin, direction, centering, nan=nan)
+    keep_beside(volume, Path(path))
+    return volume
 
 
 def read_raw(

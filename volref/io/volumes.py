@@ -14,6 +14,7 @@ import numpy as np
 from volref.arrays import Numbers, whole_number
 from volref.errors import FormatError
 from volref.io.atlas import AtlasLayout, read_atlas
+from volref.io.block_cache import keep_beside
 from volref.io.documents import whole_numbers
 from volref.io.guard import DEFAULT_MAX_BYTES, existing_file, nearest, one_line, read_json, wrapped
 from volref.io.nifti import read_nifti
@@ -94,6 +95,7 @@ def load_volume(
     values, said = reader.read(file, own, limit)
     placed = {**said, **{name: stated[name] for name in GEOMETRY if name in stated}}
     volume = Volume(values, nan=nan, **placed)
+    keep_beside(volume, file)
     if reader.kind != "NRRD" or not is_detached(file):
         _ORIGINS[volume] = origin
     return volume
@@ -126,7 +128,9 @@ def read_again(path: Path, nan: str | float, own: Statement, placement: Statemen
         If the file cannot be read.
     """
     values, _ = _reader_of(path).read(existing_file(path), own, 2**62)
-    return Volume(values, nan=nan, **placement)
+    volume = Volume(values, nan=nan, **placement)
+    keep_beside(volume, path)
+    return volume
 
 
 def file_state(path: Path) -> tuple[int, ...]:

@@ -9,6 +9,7 @@ so with o = 0 and s = 2 a "cell" volume reaches from x = -1 to 7 and a "node" vo
 A GPU texture is "cell": texture coordinate u = (index + 1/2) / n, 0 at index -0.5 and 1 at index 3.5.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -32,6 +33,9 @@ from volref.scene.transform import affine, check_regular, invert_affine
 
 # Above 2^53 neighbouring whole numbers are no longer distinct in float64.
 LARGEST_EXACT_INTEGER = 2**53
+
+# Bytes of voxels that are looked at together: a pass over a mapped file then needs no memory to speak of.
+PART_BYTES = 1 << 20
 
 IDENTITY = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
@@ -128,7 +132,7 @@ class Volume:
     @cached_property
     def value_bounds(self) -> tuple[float, float]:
         """Least and greatest value; every interpolated value lies between them."""
-        return float(self.values.min()), float(self.values.max())
+        return _least_and_greatest(self.values)
 
 
 def _positive_spacing(spacing: ArrayLike) -> Vector:
@@ -173,14 +177,40 @@ def _checked_values(values: Numbers, centering: str, nan: str | float) -> Number
     return view
 
 
+def in_memory_order(values: Numbers) -> tuple[int, int, int]:
+    """Return the axes from the one along which neighbours lie farthest apart in memory to the closest.
+
+    Examples
+    --------
+    >>> in_memory_order(np.zeros((2, 3, 4))), in_memory_order(np.zeros((2, 3, 4)).T)
+    ((0, 1, 2), (2, 1, 0))
+    """
+    first, second, third = np.argsort([-abs(stride) for stride in values.strides], kind="stable").tolist()
+    return first, second, third
+
+
+def _parts(values: Numbers) -> Iterator[Numbers]:
+    """Yield all voxels in the order in which they lie in memory or in a file, a few layers at a time."""
+    ordered = values.transpose(in_memory_order(values))
+    layers = max(1, PART_BYTES // max(1, ordered[0].nbytes))
+    for first in range(0, len(ordered), layers):
+        yield ordered[first : first + layers]
+
+
+def _least_and_greatest(values: Numbers) -> tuple[float, float]:
+    """Return the least and the greatest value, in one pass; both NaN if any is."""
+    with np.errstate(invalid="ignore"):
+        low, high = zip(*((part.min(), part.max()) for part in _parts(values)), strict=True)
+        return float(np.min(low)), float(np.max(high))
+
+
 def _finite_values(array: Numbers, nan: str | float) -> Numbers:
-    if all(np.isfinite(layer).all() for layer in array):
+    if np.isfinite(_least_and_greatest(array)).all():
         return array
-    finite = np.isfinite(array)
     if nan == "refuse":
-        where = tuple(int(i) for i in np.argwhere(~finite)[0])
+        where, count = _not_finite(array)
         message = f"volume.values must be finite, got {array[where]} at (z, y, x) = {where} "
-        message += f"and {int((~finite).sum())} such voxels; "
+        message += f"and {count} such voxels; "
         raise SceneError(message + "pass nan=VALUE to replace them")
     with np.errstate(over="ignore"):
         value = array.dtype.type(number("volume.nan", nan))
@@ -189,13 +219,29 @@ def _finite_values(array: Numbers, nan: str | float) -> Numbers:
             f"volume.nan must be a finite {array.dtype}, got {nan:g}; choose a value that the type holds"
         )
         raise SceneError(message)
-    return np.where(finite, array, value)
+    filled = array.copy(order="K")
+    for part in _parts(filled):
+        part[~np.isfinite(part)] = value
+    return filled
+
+
+def _not_finite(array: Numbers) -> tuple[tuple[int, ...], int]:
+    """Return where (z, y, x) the first voxel in memory lies that is not finite, and how many there are."""
+    first, before, count = -1, 0, 0
+    for part in _parts(array):
+        found = np.flatnonzero(~np.isfinite(part))
+        if count == 0 and len(found):
+            first = before + int(found[0])
+        before, count = before + part.size, count + len(found)
+    axes = in_memory_order(array)
+    place = np.unravel_index(first, tuple(array.shape[axis] for axis in axes))
+    return tuple(int(place[axes.index(axis)]) for axis in range(3)), count
 
 
 def _refuse_large(array: Numbers) -> None:
     if array.dtype.itemsize < 8:
         return
-    largest = max(abs(float(array.min())), abs(float(array.max())))
+    largest = max(map(abs, _least_and_greatest(array)))
     # The interpolation takes differences: 1e300 keeps them finite.
     limit = LARGEST_EXACT_INTEGER if array.dtype.kind in "iu" else 1e300
     if largest > limit:
