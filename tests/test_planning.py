@@ -8,9 +8,12 @@ import pytest
 import volref as vr
 from tests.scenes import camera_towards, colorful_transfer, rough_scene, sparse_scene
 from volref.phantoms.meshes import box_mesh
+from volref.scene.palette import FULL_PALETTE
 
 march_plan = functools.partial(vr.plan, method="march")
 exact_plan = functools.partial(vr.plan, method="exact")
+
+NEVER_NEEDED = ["gradients", "lighting", "jitter", "tone mapping"]
 
 
 def stage(plan, name):
@@ -24,6 +27,9 @@ def test_every_stage_says_in_or_out_and_why():
         "volume",
         "empty space",
         "early termination",
+        "colour",
+        "float64",
+        *NEVER_NEEDED,
         "background",
     ]
     assert all(s.reason for s in plan.stages)
@@ -33,7 +39,7 @@ def test_every_stage_says_in_or_out_and_why():
 
 def test_every_stage_of_the_exact_method_says_in_or_out_and_why():
     plan = exact_plan(rough_scene())
-    assert [s.name for s in plan.stages] == ["meshes", "volume", "empty space", "background"]
+    assert [s.name for s in plan.stages] == ["meshes", "volume", "empty space", *NEVER_NEEDED, "background"]
     assert all(s.reason for s in plan.stages)
     assert str(plan).startswith("method exact\n")
     assert json.loads(json.dumps(plan.as_dict()))["method"] == "exact"
@@ -116,14 +122,15 @@ def test_everything_forces_all_that_was_left_out():
     everything = march_plan(scene).everything()
     assert everything.occupancy is None
     assert everything.termination == 0.0
-    assert [s.name for s in everything.stages if s.included] == ["volume"]
-    expected = vr.render(scene, method="march")
+    assert [s.name for s in everything.stages if s.included] == ["volume", "colour", "float64"]
+    assert (everything.precision, everything.palette) == ("float64", FULL_PALETTE)
+    expected = vr.render(scene, plan=march_plan(scene, precision="float64"))
     np.testing.assert_array_equal(vr.render(scene, plan=everything).rgba, expected.rgba)
 
 
 def test_a_plan_with_another_step_is_followed_and_skips_only_what_it_may():
     scene = sparse_scene()
-    plan = march_plan(scene)
+    plan = march_plan(scene, precision="float64")
     for factor in (0.5, 2.0, 8.0):
         changed = dataclasses.replace(plan, step=plan.step * factor, termination=0.0)
         out = vr.render(scene, plan=changed)

@@ -54,7 +54,7 @@ def coverage(scenes):
     """
     within, beyond = [], [0.0]
     for scene in scenes:
-        out = vr.render(scene, method="march", step=0.5)
+        out = vr.render(scene, method="march", step=0.5, tolerance=1e-12)
         truth = vr.render(scene, method="exact", tolerance=1e-9)
         error = np.abs(out.rgba - truth.rgba).max(axis=-1)
         assert error.max() <= out.bound.max()

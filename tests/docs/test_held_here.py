@@ -84,11 +84,11 @@ def test_a_layer_of_one_unit_distance_has_the_opacity_of_the_table(interpolation
         assert alpha == pytest.approx(1 - 0.7**layers, abs=32 * EPS)
 
 
-def test_the_last_segment_is_shortened_to_the_end_of_the_span():
+def test_segments_are_equal_and_no_longer_than_the_step():
     table = vr.trace(box(grey(), depth=4.0), (0, 0), step=0.75).table
     lengths = table["t_end"] - table["t_start"]
     # distances near 50, each rounded by an ulp of 64
-    np.testing.assert_allclose(lengths, [0.75] * 5 + [0.25], rtol=0, atol=64 * EPS)
+    np.testing.assert_allclose(lengths, [4 / 6] * 6, rtol=0, atol=64 * EPS)
     np.testing.assert_allclose(table["opacity"], -np.expm1(-0.25 * lengths), rtol=0, atol=64 * EPS)
 
 

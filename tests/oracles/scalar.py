@@ -82,19 +82,16 @@ def march_ray(volume, transfer, origin, direction, step, surface=None, backgroun
     transmittance, color = 1.0, [0.0, 0.0, 0.0]
     if span and surface:
         span = (span[0], min(span[1], surface[0]))
-    t = span[0] if span else math.inf
-    if span and span[1] - span[0] <= 3 * step:
-        step = (span[1] - span[0]) / 3
-    while span and t < span[1] - 1e-12 * step:
-        end = min(t + step, span[1])
-        point = [a + (t + end) / 2 * b for a, b in zip(start, slope, strict=True)]
-        value = trilinear(volume.values, point)
-        opacity = segment_opacity(transfer, value, end - t)
+    length = max(span[1] - span[0], 0.0) if span else 0.0
+    count = 3 * math.ceil(length / (3 * step) * (1 - 1e-12))
+    for k in range(count):
+        t = span[0] + (k + 0.5) * length / count
+        value = trilinear(volume.values, [a + t * b for a, b in zip(start, slope, strict=True)])
+        opacity = segment_opacity(transfer, value, length / count)
         for channel in range(3):
             shade = table_value(list(transfer.values), list(transfer.colors[:, channel]), value)
             color[channel] += transmittance * opacity * shade
         transmittance *= 1 - opacity
-        t = end
     rgb = [c + transmittance * b for c, b in zip(color, behind, strict=False)]
     return [*rgb, 1 - transmittance + transmittance * behind[3]]
 

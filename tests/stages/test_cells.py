@@ -222,7 +222,7 @@ def test_the_first_size_bounds_the_partial_derivatives(term, precise):
         np.array([float(all(corner & bit or not term & bit for bit in (1, 2, 4)))]) for corner in range(8)
     )
     half, one = [np.array([0.5])] * 3, [np.array([1.0])] * 3
-    cubic, moved, size = cells._cubic(corners, np.array([0]), half, one, precise=precise)
+    cubic, moved, size = cells._cubic(list(corners), half, one, precise=precise)
     degree = bin(term).count("1")
     assert cubic[:, 0].sum() != 0
     assert moved[0] >= degree  # at the far corner each of the derivatives is 1

@@ -230,8 +230,9 @@ spans_as_they_are = spans.box_spans
 
 def lookup_not_held(table, values, work):
     entry = classify._entries(table, values, work)
-    found = table.base[:, entry] + table.slope[:, entry] * (values - table.start[entry])
-    return found[:3], found[3]
+    pieces = np.stack(table.pieces)[:, entry]
+    found = pieces.real + pieces.imag * (values - table.start[entry])
+    return found[:-1], found[-1]
 
 
 trilinear_as_it_is = sampling.trilinear
@@ -244,7 +245,7 @@ def trilinear_in_float32(grid, position, work):
 def trilinear_by_weights(grid, position, _work):
     cell = position.astype(np.int64)
     f = position - cell
-    index = cell[0] + cell[1] * grid.strides[1] + cell[2] * grid.strides[0]
+    index = cell[0] + cell[1] * grid.strides[1] + cell[2] * grid.strides[0]  # padded: 1 along x
     total = np.zeros(position.shape[1])
     for corner, values in enumerate(grid.corners):
         bits = corner & 1, corner >> 1 & 1, corner >> 2
@@ -256,8 +257,8 @@ def trilinear_by_weights(grid, position, _work):
 grid_as_it_is = sampling.padded_grid
 
 
-def grid_without_clamp(volume):
-    grid = grid_as_it_is(volume)
+def grid_without_clamp(volume, dtype=None):
+    grid = grid_as_it_is(volume, dtype)
     padded = grid.corners[0].reshape([n + 2 for n in volume.values.shape])
     for axis in range(3):
         np.moveaxis(padded, axis, 0)[-1] = 0
@@ -283,14 +284,14 @@ def gamma_of_anything(linear):
 def whole_steps(ranges, step):
     length = np.maximum(ranges.t_far - ranges.t_near, 0.0)
     counts = np.ceil(length / step).astype(np.intp)
-    return counts, np.full(len(counts), step), length - (counts - 1) * step
+    return counts, np.full(len(counts), step)
 
 
-def composite_in_float32(transmittance, color, opacity, colors, counts, _work):
-    for k, count in enumerate(counts):
-        weight = (transmittance[:count] * opacity[k, :count]).astype(np.float32)
-        transmittance[:count] = (transmittance[:count] - weight).astype(np.float32)
-        color[:, :count] = (color[:, :count] + weight * colors[:, k, :count]).astype(np.float32)
+def composite_in_float32(transmittance, color, opacity, colors, _work):
+    for k, alpha in enumerate(opacity):
+        weight = (transmittance * alpha).astype(np.float32)
+        transmittance[:] = (transmittance - weight).astype(np.float32)
+        color[:] = (color + weight * colors[:, k]).astype(np.float32)
 
 
 def any_voxels(array, nan):

@@ -13,6 +13,7 @@ where a padded index is whole; in 2-D with 5 crossings:
 Cells that cannot be seen are dropped before their cubic is made.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -38,14 +39,13 @@ PARALLEL = 2.0**-60
 class CellGrid:
     """A padded grid as cells, and which of them can be seen.
 
-    corners, strides: as in `sampling.Grid`.
+    samples: the eight samples of cells whose padded indices along x, y and z are given, x fastest.
     seen: a flag for each block of 2^`shift` cells a side, (bz, by, bx), with one layer of blocks around;
     block 1 begins at padded index 1, the first sample of the volume. near: the same for blocks of
     2^`near_shift` cells, set where anything at most half a block away from it along each axis can be seen.
     """
 
-    corners: tuple[Numbers, ...]
-    strides: tuple[int, int]
+    samples: Callable[[list[Numbers]], list[Floats]]
     seen: Booleans
     shift: int
     near: Booleans
@@ -74,13 +74,10 @@ def cells_along(
     wholes = [position.astype(np.int32) for position in positions]
     chosen = np.flatnonzero(_lookup(grid.seen, wholes, grid.shift))
     ray, length = ray.take(chosen), length.take(chosen)
-    fractions, strides, base = [], [], np.zeros(len(chosen), np.intp)
-    for axis, step in ((0, 1), (1, grid.strides[1]), (2, grid.strides[0])):
-        whole = wholes[axis].take(chosen)
-        fractions.append(positions[axis].take(chosen) - whole)
-        strides.append(direction[axis].take(chosen) * length)
-        base += whole if step == 1 else np.multiply(whole, step, dtype=np.intp)
-    cubic, moved, size = _cubic(grid.corners, base, fractions, strides, precise=precise)
+    wholes = [whole.take(chosen) for whole in wholes]
+    fractions = [position.take(chosen) - whole for position, whole in zip(positions, wholes, strict=True)]
+    strides = [d.take(chosen) * length for d in direction]
+    cubic, moved, size = _cubic(grid.samples(wholes), fractions, strides, precise=precise)
     slack = error.take(ray) * moved + (ARITHMETIC * ROUNDOFF) * size
     slack += np.where(size > 0, ROUNDOFF * np.abs(cubic[0]), 0.0)
     slowest = np.where(directions == 0, np.inf, np.abs(directions)).min(axis=0)
@@ -216,27 +213,21 @@ def _lookup(flags: Booleans, wholes: list[Numbers], shift: int) -> Booleans:
 
 
 def _cubic(
-    corners: tuple[Numbers, ...],
-    base: Indices,
-    fraction: list[Floats],
-    stride: list[Floats],
-    *,
-    precise: bool,
+    at: list[Floats], fraction: list[Floats], stride: list[Floats], *, precise: bool
 ) -> tuple[Floats, Floats, Floats]:
-    """Return the cubic (4, n) of f(fraction + v stride) in the cell at `base`, and two sizes (n,).
+    """Return the cubic (4, n) of f(fraction + v stride) in cells of corners `at`, and two sizes (n,).
 
     f = k0 + kx x + ky y + kz z + kxy x y + kxz x z + kyz y z + kxyz x y z.  The first size bounds the sum of
     the partial derivatives on the piece, the second the differences of the cell's samples.
     """
     # corner (dz, dy, dx) is number 4 dz + 2 dy + dx
-    at = [corner.take(base).astype(np.float64, copy=False) for corner in corners]
     k0 = at[0]
     kx, ky, kz = at[1] - k0, at[2] - k0, at[4] - k0
     kxy, kxz, kyz = at[3] - k0 - kx - ky, at[5] - k0 - kx - kz, at[6] - k0 - ky - kz
     kxyz = at[7] - k0 - kx - ky - kz - kxy - kxz - kyz
     x, y, z = fraction
     dx, dy, dz = stride
-    cubic = np.empty((4, len(base)))
+    cubic = np.empty((4, len(k0)))
     cross_x, cross_y, cross_z = kyz + kxyz * x, kxz + kxyz * y, kxy + kxyz * z
     slope_x = kx + kxy * y + cross_y * z
     slope_y = ky + kxy * x + cross_x * z

@@ -1,65 +1,61 @@
 """Stage 5: compositing along the ray, front to back.
 
-R rays and a block of S consecutive segments; opacities are (S, R), colours (3, S, R), and what is
-accumulated is transmittance (R,) and premultiplied colour (3, R).  Rays are sorted so that those whose
-k-th segment exists come first: `counts[k]` of them.
+R rays and a block of S consecutive segments of equal length, S a multiple of 3; opacities are (S, R), colours
+(c, S, R), and what is accumulated is transmittance (R,) and premultiplied colour (c, R), or (c + 1, R) with
+the sum of the weights, which is all that a colour that never changes needs.
 """
 
 import numpy as np
 
-from volref.arrays import Floats, Indices
+from volref.arrays import Floats
 from volref.workspace import Workspace
 
 
 def composite_block(
-    transmittance: Floats, color: Floats, opacity: Floats, colors: Floats, counts: Indices, work: Workspace
+    transmittance: Floats, color: Floats, opacity: Floats, colors: Floats, work: Workspace
 ) -> None:
-    """Add a block of segments to `transmittance` and `color`, in place.
+    """Add a block of segments to `transmittance` and `color`, in place; destroys `colors`.
 
     weight_k = T_k opacity_k and T_(k+1) = T_k - weight_k (Max 1995, eq. 8, with the product telescoped):
     the weights and the last transmittance then add up to 1 but for one rounding each.
     """
-    for k, count in enumerate(counts):
-        weight = work.get("weight", count)
-        light = work.get("light", count)
-        np.multiply(transmittance[:count], opacity[k, :count], out=weight)
-        np.subtract(transmittance[:count], weight, out=transmittance[:count])
-        for channel in range(3):  # no einsum: it fuses all but the odd last rays, which then differ by an ulp
-            np.multiply(weight, colors[channel, k, :count], out=light)
-            np.add(color[channel, :count], light, out=color[channel, :count])
+    weights = work.get("weights", opacity.size, opacity.dtype).reshape(opacity.shape)
+    for weight, alpha in zip(weights, opacity, strict=True):
+        np.multiply(transmittance, alpha, out=weight)
+        np.subtract(transmittance, weight, out=transmittance)
+    if len(color) > len(colors):
+        for weight in weights:
+            np.add(color[-1], weight, out=color[-1])
+    # No einsum, and no sum over an axis: they round a ray differently by its place in the array.
+    shining = color[: len(colors)]
+    light = np.multiply(colors, weights, out=colors)
+    for k in range(len(opacity)):
+        np.add(shining, light[:, k], out=shining)
 
 
 def composite_block_coarse(
-    transmittance: Floats, color: Floats, opacity: Floats, colors: Floats, counts: Indices, lengths: Floats
+    transmittance: Floats, color: Floats, opacity: Floats, colors: Floats, work: Workspace
 ) -> None:
     """Add the same block as if the step were three times as long.
 
-    Of three whole segments the middle one's sample is the midpoint of their union, so the coarse midpoint
-    rule needs no sample of its own: its opacity is 1 - (1 - a)^3 = a (3 - 3 a + a^2).  The last one to
-    three segments of a ray, of which the last is shortened, are united as well and take the sample of
-    the second of three, or of the first of two or one.  `lengths` (R,) says how many segments of full
-    length each ray has from the start of the block on, the shortened one as its fraction.
+    Of three segments the middle one's sample is the midpoint of their union, so the coarse midpoint rule
+    needs no sample of its own: its opacity is 1 - (1 - a)^3 = a (3 - 3 a + a^2).
     """
-    for group in range(len(counts) // 3):
-        first = 3 * group
-        remaining = lengths - first
-        whole = int(np.searchsorted(-remaining, -3.0, side="left"))
-        a = opacity[first + 1, :whole]
-        _add(transmittance, color, slice(0, whole), (a * a - 3 * a + 3) * a, colors[:, first + 1])
-        bounds = (whole, int(counts[first + 2]), int(counts[first + 1]), int(counts[first]))
-        for k, sample in enumerate((first + 1, first, first)):
-            ending = slice(bounds[k], bounds[k + 1])
-            a = opacity[sample, ending]
-            if k < 2:  # the opacity is that of a whole segment
-                with np.errstate(divide="ignore"):
-                    a = -np.expm1(remaining[ending] * np.log1p(-a))
-            _add(transmittance, color, ending, a, colors[:, sample])
-
-
-def _add(transmittance: Floats, color: Floats, rays: slice, opacity: Floats, colors: Floats) -> None:
-    weight = transmittance[rays] * opacity
-    transmittance[rays] -= weight
-    color[:, rays] += weight * colors[:, rays]
+    middle, middle_colors = opacity[1::3], colors[:, 1::3]
+    united = work.get("united", middle.size, opacity.dtype).reshape(middle.shape)
+    np.subtract(middle, 3, out=united)
+    np.multiply(united, middle, out=united)
+    np.add(united, 3, out=united)
+    np.multiply(united, middle, out=united)
+    shining = color[: len(colors)]
+    light = work.get("coarse light", shining.size, opacity.dtype).reshape(shining.shape)
+    for k, weight in enumerate(united):
+        np.multiply(weight, transmittance, out=weight)
+        np.subtract(transmittance, weight, out=transmittance)
+        if len(color) > len(colors):
+            np.add(color[-1], weight, out=color[-1])
+        np.multiply(middle_colors[:, k], weight, out=light)
+        np.add(shining, light, out=shining)
 
 
 def over(color: Floats, transmittance: Floats, behind: Floats) -> Floats:

@@ -10,6 +10,7 @@ model then is exact, or into shorter parts.
 import dataclasses
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -25,7 +26,7 @@ from volref.stages.cells import CellGrid, cells_along, position_error, recentred
 from volref.stages.models import FEW_BENDS, Models, look_up, models_of, piece_of
 from volref.stages.radiance import ROUNDOFF, Gathered, gathered
 from volref.stages.rays import pixel_rays
-from volref.stages.sampling import PAD, Grid, padded_grid, trilinear
+from volref.stages.sampling import PAD, Grid, cell_corners, grid_of, trilinear
 from volref.stages.spans import box_spans, cut_at_surface
 from volref.stages.splitting import split_at_bends, split_evenly, split_geometrically, value_range
 from volref.truth.modelling import Solved, modelled
@@ -69,7 +70,7 @@ def prepare(scene: Scene, plan: Plan) -> Prepared:
     volume, transfer = scene.volume, scene.transfer
     assert volume is not None
     assert transfer is not None
-    grid = padded_grid(volume)
+    grid = grid_of(volume)
     shift, near_shift = (1, 2) if volume.values.size <= FINE_FLAGS else (2, 3)
     half = 1 << (near_shift - 1)
 
@@ -81,8 +82,7 @@ def prepare(scene: Scene, plan: Plan) -> Prepared:
         return np.pad(seen, 1, mode="edge")
 
     cells = CellGrid(
-        grid.corners,
-        grid.strides,
+        partial(cell_corners, grid),
         flags(1 << shift, 0),
         shift,
         flags(1 << near_shift, half),

@@ -40,7 +40,7 @@ class Integration:
     @cached_property
     def field(self) -> Field:
         """The volume made ready for the marcher."""
-        return field_of(self.scene)
+        return field_of(self.scene, self.plan)
 
     @cached_property
     def prepared(self) -> Prepared:

@@ -1,17 +1,26 @@
 """The marcher: the emission-absorption integral by the midpoint rule at a uniform step.
 
-R rays of a chunk, S segments of a block.  Ray state is (rows, R) so that one gather fetches all of it.
+R rays of a chunk, S segments of a block, B blocks of a batch, c colour channels.
 
 With extinction sigma and colour c along a ray from t_near to t_far (Max 1995, eq. 5),
 
     C = integral of c sigma T dt + T(t_far) B,     T(t) = exp(-integral of sigma from t_near to t)
 
-Segments have the length `step` but for the last, which is shortened to end at t_far, be that the box or
-an opaque surface; a span of up to three steps has three equal segments, so that its error can be
-estimated too.  Each is taken as homogeneous with the value at its middle, which is of second order in the
-step wherever sigma and c are continuous.
+A span is cut into equal segments, at most `step` long and three by three, be its end the box or an opaque
+surface.  Each is taken as homogeneous with the value at its middle, which is of second order in the step
+wherever sigma and c are continuous.  Taken three by three, the same samples are the midpoint rule at three
+times the step: the difference of both is the estimate of the error.
+
+Blocks of six segments in which nothing can be seen are left out before anything is sampled, and the rays are
+sorted by how many are left, so that at any time those that still have one come first:
+
+    ray 0   . . # # . # #            its blocks   2 3 5 6
+    ray 1   # # # . . . .      ->                 0 1 2
+    ray 2   . . . . # . .                         4
+                                    batches of      B B B B
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,21 +33,18 @@ from volref.scene.transform import transform_directions, transform_points
 from volref.stages.classify import Table, classify, lookup_table, segment_opacity
 from volref.stages.composite import composite_block, composite_block_coarse, over
 from volref.stages.rays import pixel_rays
-from volref.stages.sampling import PAD, Grid, padded_grid, trilinear
+from volref.stages.sampling import PAD, Grid, grid_of, trilinear
 from volref.stages.spans import box_spans, cut_at_surface
 from volref.workspace import Workspace
 
-# Rows of the ray state.  What stays: where the span begins and how far one segment goes, in padded index
-# space; the length of a segment in the world; the length of the last one as a fraction of that.
-START, STRIDE, STEP, LAST = slice(0, 3), slice(3, 6), 6, 7
-# What accumulates, at the step and at three times the step.
-TRANSMITTANCE, COLOR = 8, slice(9, 12)
-COARSE_TRANSMITTANCE, COARSE_COLOR = 12, slice(13, 16)
-ACCUMULATED = slice(TRANSMITTANCE, 16)
-ROWS = 16
+# Blocks that are sampled together: fewer, and NumPy's cost per call shows; more, and they leave the cache.
+BATCH = 6144
 
-# Where no more than this part of a block's samples is visible, only those are classified.
-MOST_VISIBLE = 0.5
+# Rays that have ended early are dropped when they are more than this part of those at work.
+MOST_ENDED = 1 / 8
+
+# Rows of blocks that are looked up together.
+ROWS = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,15 +59,17 @@ class Field:
     color_limit: float
 
 
-def field_of(scene: Scene) -> Field:
-    """Prepare the volume of `scene` for marching; costs one pass over its voxels."""
+def field_of(scene: Scene, plan: Plan) -> Field:
+    """Prepare the volume of `scene` for marching; the first time it costs one pass over its voxels."""
     volume, transfer = scene.volume, scene.transfer
     assert volume is not None
     assert transfer is not None
     low, high = volume.index_bounds
     return Field(
-        padded_grid(volume),
-        lookup_table(transfer, volume.value_bounds),
+        grid_of(volume, plan.precision),
+        lookup_table(
+            transfer, volume.value_bounds, colors=plan.palette.looked_up, dtype=np.dtype(plan.precision)
+        ),
         volume.index_from_world,
         low,
         high,
@@ -78,6 +86,32 @@ class Chunk:
     samples: int
 
 
+@dataclass(eq=False)
+class _State:
+    """Rays at work: where they start and how far a segment goes (3, R) in padded index space, and sums.
+
+    number (R,): which ray of the chunk it is.  length (R,): of a segment, in the world.  segments (R,): how
+    many there are.  blocks (R,): how many of its blocks are marched; rays are sorted by it.  first (b, R):
+    the first segment of each of them.  coarse_transmittance and coarse_color are those at three times the
+    step.
+    """
+
+    number: Indices
+    start: Floats
+    stride: Floats
+    length: Floats
+    segments: Indices
+    blocks: Indices
+    first: Indices
+    transmittance: Floats
+    color: Floats
+    coarse_transmittance: Floats
+    coarse_color: Floats
+
+    def take(self, rays: Indices) -> "_State":
+        return _State(**{name: array.take(rays, axis=-1) for name, array in vars(self).items()})
+
+
 def march_chunk(
     scene: Scene,
     plan: Plan,
@@ -89,10 +123,10 @@ def march_chunk(
 ) -> Chunk:
     """March the rays of `pixels` (R,) to `distance` (R,) and put the result over `behind` (R, 4).
 
-    The bound is an estimate: the difference to the midpoint rule at three times the step (from the same
-    samples), plus rounding of one eps per segment, plus what lies behind an early end, which is certain.
-    Where the leading term of the error rules, that difference is 8 times the error at second order and
-    twice the error at first; a feature that both rules step over escapes it.
+    The bound is an estimate: the difference to the midpoint rule at three times the step, plus what rounding
+    may be off, plus what lies behind an early end, which is certain.  Where the leading term of the error
+    rules, that difference is 8 times the error at second order and twice the error at first; a feature that
+    both rules step over escapes it.
     """
     if field is None:
         return Chunk(behind.copy(), np.zeros(len(pixels)), 0)
@@ -100,167 +134,212 @@ def march_chunk(
     origins = transform_points(field.index_from_world, rays.origins).T
     directions = transform_directions(field.index_from_world, rays.directions).T
     spans = cut_at_surface(box_spans(origins, directions, field.low, field.high), distance)
-    counts, steps, last = segments_of(spans, plan.step)
-    order = np.argsort(-counts, kind="stable")[: np.count_nonzero(counts)]
-    counts, steps = counts[order], steps[order]
-    state = np.zeros((ROWS, len(order)))
-    state[START] = origins[:, order] + PAD + directions[:, order] * spans.t_near[order]
-    state[STRIDE], state[STEP], state[LAST] = directions[:, order] * steps, steps, last[order] / steps
-    state[TRANSMITTANCE] = state[COARSE_TRANSMITTANCE] = 1.0
-    samples = _march(field, plan, state, counts, work)
-    rgba, bound = behind.copy(), np.zeros(len(pixels))
-    rgba[order], bound[order] = _finish(field, plan, state, counts, behind[order])
+    state = _state_of(plan, field, origins, directions, spans)
+    rgba, bound, samples = behind.copy(), np.zeros(len(pixels)), 0
+    for part in _marched(plan, field, state, work):
+        samples += int((part.blocks * SEGMENTS_PER_BLOCK).sum())
+        rgba[part.number], bound[part.number] = _finish(field, plan, part, behind[part.number])
     return Chunk(rgba, bound, samples)
 
 
-def segments_of(spans: Spans, step: float) -> tuple[Indices, Floats, Floats]:
-    """Return for each span how many segments it has, their length, and the length of the last, (R,) each.
+def segments_of(spans: Spans, step: float) -> tuple[Indices, Floats]:
+    """Return how many segments each span has, a multiple of three, and how long they are, (R,) each.
 
-    A span of 0.4 has 4 segments of 0.1, although rounding may make 0.4 / 0.1 more than 4: a last segment
-    shorter than 1e-12 of the span is joined to the one before it.
+    They are at most `step` long.  A span of 0.6 has 6 segments of 0.1, although rounding may make 0.6 / 0.1
+    more than 6: they may be longer than the step by 1e-12 of it.
 
     Examples
     --------
-    >>> spans = Spans(np.array([0.0, 1.0, 0.0, 2.0]), np.array([0.1 + 0.3, 1.35, 0.15, 1.0]))
+    >>> spans = Spans(np.array([0.0, 1.0, 0.0, 2.0]), np.array([0.7 - 0.1, 1.7, 0.15, 1.0]))
     >>> [part.round(3).tolist() for part in segments_of(spans, 0.1)]
-    [[4, 4, 3, 0], [0.1, 0.1, 0.05, 0.1], [0.1, 0.05, 0.05, 0.0]]
+    [[6, 9, 3, 0], [0.1, 0.078, 0.05, 0.0]]
     """
     length = np.maximum(spans.t_far - spans.t_near, 0.0)
-    counts = np.ceil(length / step * (1 - 1e-12)).astype(np.intp)
-    short = (length > 0) & (counts <= 3)
-    counts = np.where(short, 3, counts)
-    steps = np.where(short, length / 3, step)
-    last = np.where(short, steps, length - (counts - 1) * step)
-    return counts, steps, np.where(counts > 0, last, 0.0)
+    counts = 3 * np.ceil(length / (3 * step) * (1 - 1e-12)).astype(np.intp)
+    counts = np.where((length > 0) & (counts == 0), 3, counts)
+    return counts, length / np.maximum(counts, 1)
 
 
-def _march(field: Field, plan: Plan, state: Floats, counts: Indices, work: Workspace) -> int:
-    """March all rays of `state`, sorted by falling `counts`, in place; return the values interpolated."""
-    samples = 0
-    most = int(counts[0]) if len(counts) else 0
-    blocks_along = _blocks_along(plan, state)
-    for first in range(0, most, SEGMENTS_PER_BLOCK):
-        existing = int(np.searchsorted(-counts, -first, side="left"))
-        live = np.ones(existing, np.bool_)
-        if blocks_along is not None:
-            live &= _occupied(*blocks_along, existing, first, work)
-        if plan.termination > 0:
-            live &= state[TRANSMITTANCE, :existing] >= plan.termination
-        if live.all():
-            _march_block(field, plan.step, state[:, :existing], counts[:existing], first, work)
-            samples += existing * SEGMENTS_PER_BLOCK
-        elif live.any():
-            chosen = np.flatnonzero(live)
-            part = state.take(chosen, axis=1)
-            _march_block(field, plan.step, part, counts[chosen], first, work)
-            state[ACCUMULATED, chosen] = part[ACCUMULATED]
-            samples += len(chosen) * SEGMENTS_PER_BLOCK
-    return samples
+def _state_of(plan: Plan, field: Field, origins: Floats, directions: Floats, spans: Spans) -> _State:
+    """Return the rays that have something to march, sorted, before anything is marched."""
+    segments, length = segments_of(spans, plan.step)
+    hit = np.flatnonzero(segments)
+    segments, length = segments[hit], length[hit]
+    start = origins[:, hit] + PAD + directions[:, hit] * spans.t_near[hit]
+    stride = directions[:, hit] * length
+    blocks, order, first = _blocks_to_march(plan, start, stride, segments)
+    hit = hit[order]
+    kind = field.table.start.dtype
+    count, channels = len(order), plan.palette.composited
+    return _State(
+        hit,
+        start[:, order].astype(kind),
+        stride[:, order].astype(kind),
+        length[order].astype(kind),
+        segments[order],
+        blocks[order],
+        first,
+        np.ones(count, kind),
+        np.zeros((channels, count), kind),
+        np.ones(count, kind),
+        np.zeros((channels, count), kind),
+    )
 
 
-def _blocks_along(plan: Plan, rays: Floats) -> tuple[Occupancy, Floats, Floats] | None:
-    """Return the occupancy, and the start and stride of rays (3, R) counted in its blocks.
+def _blocks_to_march(
+    plan: Plan, start: Floats, stride: Floats, segments: Indices
+) -> tuple[Indices, Indices, Indices]:
+    """Return how many blocks each ray has (R,), the rays in falling order of that, and their first segments.
 
-    None where all is to be taken for occupied: by the plan, or because a block of segments is longer than
-    the reach that the occupancy was made for.
+    The last is (b, R) in the new order: the first segment of each block, b of them at most.
     """
+    existing = -(-segments // SEGMENTS_PER_BLOCK)
+    most = int(existing.max(initial=0))
     occupancy = plan.occupancy
-    if occupancy is None or plan.step * SEGMENTS_PER_BLOCK / 2 > occupancy.reach:
-        return None
-    start = (rays[START] - PAD) / BLOCK + np.array(occupancy.layers)[:, None]
-    return occupancy, start, rays[STRIDE] / BLOCK
+    # An occupancy holds for the step that it was made for.
+    if occupancy is None or plan.step * SEGMENTS_PER_BLOCK / 2 > occupancy.reach * (1 + 1e-9):
+        order = _falling(existing)
+        first = np.arange(0, most * SEGMENTS_PER_BLOCK, SEGMENTS_PER_BLOCK)[:, None]
+        return existing, order, np.broadcast_to(first, (most, len(order)))
+    seen = _seen(occupancy, start, stride, existing)
+    blocks = np.zeros(len(existing), np.intp)
+    for row in seen:
+        blocks += row
+    order = _falling(blocks)
+    order = order[: np.count_nonzero(blocks)]
+    place = np.empty(len(blocks), np.intp)
+    place[order] = np.arange(len(order))
+    first = np.zeros((int(blocks.max(initial=0)), len(order)), np.intp)
+    filled = np.zeros(len(order), np.intp)
+    for number, row in enumerate(seen):
+        rays = place[np.flatnonzero(row)]
+        first[filled[rays], rays] = number * SEGMENTS_PER_BLOCK
+        filled[rays] += 1
+    return blocks, order, first
 
 
-def _occupied(
-    occupancy: Occupancy, start: Floats, stride: Floats, count: int, first: int, work: Workspace
-) -> Booleans:
-    """Tell which of the first `count` rays can see something in the block of segments from `first` on.
+def _falling(counts: Indices) -> Indices:
+    """Return the order that sorts counts from high to low, equal ones as they stand."""
+    # NumPy sorts 16-bit numbers by their digits, ten times as fast.
+    small = len(counts) == 0 or counts.max() < 2**15
+    keys = counts.astype(np.int16 if small else np.int64)
+    return np.argsort(np.negative(keys), kind="stable")
 
-    The block around the middle of the segments answers for all of them: they lie within its reach.
+
+def _seen(occupancy: Occupancy, start: Floats, stride: Floats, blocks: Indices) -> Booleans:
+    """Tell of each block of each ray whether anything can be seen in it, (most, R).
+
+    The block of cells around the middle of its segments answers for all of them: they lie within its reach.
     """
-    place = work.get("place in blocks", count)
-    flat, whole = np.zeros(count, np.intp), work.get("whole block", count, np.int32)
-    for axis, length in zip((2, 1, 0), occupancy.blocks.shape, strict=True):
-        np.multiply(stride[axis, :count], first + SEGMENTS_PER_BLOCK / 2, out=place)
-        np.add(place, start[axis, :count], out=place)
-        np.copyto(whole, place, casting="unsafe")
-        np.multiply(flat, length, out=flat)
-        np.add(flat, whole, out=flat)
-    return np.take(occupancy.blocks.reshape(-1), flat, mode="clip")
+    most, count = int(blocks.max(initial=0)), len(blocks)
+    # The occupancy reaches far enough for the rounding of float32 where blocks are few along each axis.
+    kind = np.dtype(np.float32 if max(occupancy.blocks.shape) < 2**10 else np.float64)
+    begin = ((start - PAD) / BLOCK + np.array(occupancy.layers)[:, None]).astype(kind)
+    along = (stride * (SEGMENTS_PER_BLOCK / BLOCK)).astype(kind)
+    seen = np.empty((most, count), np.bool_)
+    middles = (np.arange(most) + 0.5).astype(kind)[:, None]
+    flags = occupancy.blocks.reshape(-1)
+    for row in range(0, most, ROWS):
+        middle = middles[row : row + ROWS]
+        flat = np.zeros((len(middle), count), np.int32)
+        whole, place = np.empty_like(flat), np.empty(flat.shape, kind)
+        for axis, length in zip((2, 1, 0), occupancy.blocks.shape, strict=True):
+            np.multiply(middle, along[axis], out=place)
+            np.add(place, begin[axis], out=place)
+            np.copyto(whole, place, casting="unsafe")
+            np.multiply(flat, length, out=flat)
+            np.add(flat, whole, out=flat)
+        np.take(flags, flat, mode="clip", out=seen[row : row + ROWS])
+    seen &= np.arange(most)[:, None] < blocks
+    return seen
 
 
-def _march_block(
-    field: Field, step: float, rays: Floats, counts: Indices, first: int, work: Workspace
+def _marched(plan: Plan, field: Field, state: _State, work: Workspace) -> Iterator[_State]:
+    """March all rays of `state`; yield them as they end."""
+    offsets = _offsets(state)
+    row = 0
+    while len(state.blocks) and row < state.blocks[0]:
+        if plan.termination > 0:
+            live = state.transmittance >= plan.termination
+            ended = len(live) - np.count_nonzero(live)
+            if ended > MOST_ENDED * np.searchsorted(-state.blocks, -row, side="left"):
+                gone = state.take(np.flatnonzero(~live))
+                gone.blocks = np.minimum(gone.blocks, row)
+                yield gone
+                kept = np.flatnonzero(live)
+                state, offsets = state.take(kept), offsets.take(kept, axis=-1)
+                continue
+        counts = _batch(state.blocks, row)
+        _march_batch(plan, field, state, offsets, row, counts, work)
+        row += len(counts)
+    yield state
+
+
+def _offsets(state: _State) -> Floats:
+    """Return how far the samples of a block lie from its beginning, (3, S, R)."""
+    middles = (np.arange(SEGMENTS_PER_BLOCK) + 0.5).astype(state.stride.dtype)
+    return np.asarray(state.stride[:, None] * middles[:, None])
+
+
+def _batch(blocks: Indices, row: int) -> list[int]:
+    """Return how many rays have a block in each of the next rows, as many rows as make a batch."""
+    counts: list[int] = []
+    while row + len(counts) < blocks[0]:
+        count = int(np.searchsorted(-blocks, -(row + len(counts)), side="left"))
+        if counts and sum(counts) + count > BATCH:
+            break
+        counts.append(count)
+    return counts
+
+
+def _march_batch(
+    plan: Plan, field: Field, state: _State, offsets: Floats, row: int, counts: list[int], work: Workspace
 ) -> None:
-    """Sample and composite the segments from `first` on, in place."""
-    # How many rays have each segment of the block, and the one after it; they come first.
-    existing = np.searchsorted(-counts, -np.arange(first, first + SEGMENTS_PER_BLOCK + 1), side="left")
-    opacity, colors = _sample_block(field, step, rays, counts - first, first, int(existing[-1]), work)
-    existing = existing[:-1]
-    composite_block(rays[TRANSMITTANCE], rays[COLOR], opacity, colors, existing, work)
-    lengths = counts - first - 1 + rays[LAST]
-    composite_block_coarse(rays[COARSE_TRANSMITTANCE], rays[COARSE_COLOR], opacity, colors, existing, lengths)
-
-
-def _sample_block(
-    field: Field, step: float, rays: Floats, remaining: Indices, first: int, ending: int, work: Workspace
-) -> tuple[Floats, Floats]:
-    """Return opacity (S, R) and colours (3, S, R) of the segments from `first` on.
-
-    `remaining` (R,) segments are left of each ray; the rays from `ending` on end in this block, and their
-    lengths differ, from each other and within.  Segments beyond a ray's end hold numbers without meaning;
-    compositing leaves them out.
-    """
-    final, columns = remaining[ending:] - 1, np.arange(len(remaining) - ending)
-    last = rays[LAST, ending:]
-    middles = (np.arange(first, first + SEGMENTS_PER_BLOCK) + 0.5)[:, None]
-    shape = SEGMENTS_PER_BLOCK, len(remaining)
-    position: Floats = work.get("position", 3 * SEGMENTS_PER_BLOCK * len(remaining)).reshape(3, *shape)
-    for place, start, stride in zip(position, rays[START], rays[STRIDE], strict=True):
-        np.multiply(middles, stride, out=place)
-        place[:, ending:][final, columns] = (first + final + last / 2) * stride[ending:]
-        np.add(place, start, out=place)
+    """Sample rows of blocks together, and composite them one after the other, in place."""
+    total, kind = sum(counts), state.stride.dtype
+    shape = SEGMENTS_PER_BLOCK, total
+    position: Floats = work.get("position", 3 * SEGMENTS_PER_BLOCK * total, kind).reshape(3, *shape)
+    lengths: Floats = work.get("lengths", total, kind)
+    begin = 0
+    for number, count in enumerate(counts, start=row):
+        columns = slice(begin, begin + count)
+        corner = state.stride[:, :count] * state.first[number, :count]
+        corner += state.start[:, :count]
+        np.add(offsets[..., :count], corner[:, None], out=position[..., columns])
+        lengths[columns] = state.length[:count]
+        begin += count
     values = trilinear(field.grid, position.reshape(3, -1), work)
-    lengths = np.tile(rays[STEP, ending:], (SEGMENTS_PER_BLOCK, 1))
-    lengths[final, columns] *= last
-    _, strength = classify(field.table, values.reshape(shape)[:, ending:].ravel(), work)
-    end_opacity = segment_opacity(field.table, strength.reshape(lengths.shape), lengths).copy()
-    opacity, colors = _classified(field.table, values, step, work)
-    opacity, colors = opacity.reshape(shape), colors.reshape(3, *shape)
-    opacity[:, ending:] = end_opacity
-    return opacity, colors
+    colors, strength = classify(field.table, values, work)
+    opacity = segment_opacity(field.table, strength.reshape(shape), lengths)
+    colors = colors.reshape(len(colors), *shape)
+    begin = 0
+    for number, count in enumerate(counts, start=row):
+        columns = slice(begin, begin + count)
+        _composite(plan, state, number, opacity[:, columns], colors[..., columns], work)
+        begin += count
 
 
-def _classified(table: Table, values: Floats, step: float, work: Workspace) -> tuple[Floats, Floats]:
-    """Return the opacities (n,) of segments `step` long and the colours (3, n) of their values.
-
-    Colours of what is transparent are left as they were: nothing is ever multiplied by them but 0.
-    """
-    low, high = table.visible
-    seen = work.get("seen", len(values), np.bool_)
-    np.greater_equal(values, low, out=seen)
-    seen &= values <= high
-    if np.count_nonzero(seen) > MOST_VISIBLE * len(values):
-        colors, strength = classify(table, values, work)
-        return segment_opacity(table, strength, step), colors
-    chosen = np.flatnonzero(seen)
-    few_colors, strength = classify(table, values[chosen], work)
-    opacity: Floats = work.get("opacity", len(values))
-    colors = work.get("colors", 3 * len(values)).reshape(3, -1)
-    opacity[:] = 0.0
-    opacity[chosen] = segment_opacity(table, strength, step)
-    for color, few in zip(colors, few_colors, strict=True):
-        color[chosen] = few
-    return opacity, colors
+def _composite(plan: Plan, state: _State, row: int, opacity: Floats, colors: Floats, work: Workspace) -> None:
+    """Add one row of blocks to the rays that have one, in place."""
+    count = opacity.shape[1]
+    # The last block of a ray may be a half.
+    half = np.flatnonzero(state.segments[:count] - state.first[row, :count] < SEGMENTS_PER_BLOCK)
+    opacity[SEGMENTS_PER_BLOCK // 2 :, half] = 0.0
+    if plan.termination > 0:
+        ended = np.flatnonzero(state.transmittance[:count] < plan.termination)
+        opacity[:, ended] = 0.0
+    coarse = state.coarse_transmittance[:count], state.coarse_color[:, :count]
+    composite_block_coarse(*coarse, opacity, colors, work)
+    composite_block(state.transmittance[:count], state.color[:, :count], opacity, colors, work)
 
 
-def _finish(
-    field: Field, plan: Plan, state: Floats, counts: Indices, behind: Floats
-) -> tuple[Floats, Floats]:
+def _finish(field: Field, plan: Plan, state: _State, behind: Floats) -> tuple[Floats, Floats]:
     """Return rgba (R, 4) over what lies behind, and the bound (R,), of marched rays."""
-    rgba = over(state[COLOR], state[TRANSMITTANCE], behind)
-    coarse = over(state[COARSE_COLOR], state[COARSE_TRANSMITTANCE], behind)
+    clear = state.transmittance.astype(np.float64)
+    rgba = over(plan.palette.spread(state.color), clear, behind)
+    coarse_clear = state.coarse_transmittance.astype(np.float64)
+    coarse = over(plan.palette.spread(state.coarse_color), coarse_clear, behind)
     brightest = np.maximum(behind.max(axis=1), max(field.color_limit, 1.0))
-    cut = np.where(state[TRANSMITTANCE] < plan.termination, state[TRANSMITTANCE], 0.0)
-    rounding = np.finfo(np.float64).eps * counts
+    cut = np.where(clear < plan.termination, clear, 0.0)
+    rounding = float(np.finfo(state.stride.dtype).eps) * state.segments + plan.rounding
     return rgba, np.abs(rgba - coarse).max(axis=1) + (rounding + cut) * brightest

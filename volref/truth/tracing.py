@@ -124,7 +124,7 @@ def _surface_words(surface: Surface | None, x: int, y: int) -> dict[str, Any] | 
 
 def _trace_volume(scene: Scene, plan: Plan, rays: Rays, distance: float, head: dict[str, Any]) -> Trace:
     """Trace one ray through the volume of `scene` up to a surface `distance` away, +inf without one."""
-    field = field_of(scene)
+    field = field_of(scene, plan.everything())
     origin = transform_points(field.index_from_world, rays.origins).T
     direction = transform_directions(field.index_from_world, rays.directions).T
     box = box_spans(origin, direction, field.low, field.high)
@@ -134,11 +134,10 @@ def _trace_volume(scene: Scene, plan: Plan, rays: Rays, distance: float, head: d
         missed = box.t_near[0] >= box.t_far[0]
         ended = "the ray misses the volume" if missed else "a surface lies in front of the volume"
         return Trace({**head, "span": None, "ended": ended, "rgba": head["behind"]}, {})
-    counts, steps, last = segments_of(spans, plan.step)
-    start = t_near + np.arange(counts[0]) * steps[0]
-    length = np.append(np.full(len(start) - 1, steps[0]), last)
-    middle = np.arange(counts[0]) + length / steps[0] / 2
-    index = origin + direction * t_near + middle * (direction * steps[0])
+    counts, steps = segments_of(spans, plan.step)
+    number = np.arange(counts[0])
+    start, length = t_near + number * steps[0], np.full(counts[0], steps[0])
+    index = origin + direction * t_near + (number + 0.5) * (direction * steps[0])
     table = _table(scene, field, start, length, index)
     table["t_end"] = np.append(start[1:], t_far)
     table["position"] = rays.origins[0] + table["t"][:, None] * rays.directions[0]

@@ -26,6 +26,9 @@ TOLERANCES = (1e-2, HALF_LEVEL, *(10.0**-digits for digits in range(3, 13)))
 # Steps of the marcher in units of the least spacing, those of the rivals.
 STEPS = (4.0, 2.0, 1.0, 0.5, 0.25, 0.125, 0.0625)
 
+# A tolerance that keeps the marcher to float64.
+DIGITS = 1e-12
+
 # Families by the first word of a rival's name; one line each in a plot.
 FAMILIES = {
     "left-riemann": "Riemann or trapezoid",
@@ -78,7 +81,8 @@ def _least_spacing(scene: Scene) -> float:
 
 
 def _marched(scene: Scene, step: float) -> Answer:
-    return _answer(render(scene, method="march", step=step * _least_spacing(scene), threads=1))
+    length = step * _least_spacing(scene)
+    return _answer(render(scene, method="march", step=length, tolerance=DIGITS, threads=1))
 
 
 def _asked(scene: Scene, tolerance: float, *, method: str, certified: bool) -> Answer:

@@ -11,6 +11,7 @@ from typing import TypeAlias
 import numpy as np
 
 from volref.arrays import Floats
+from volref.planning import plan
 from volref.scene.scene import Scene
 from volref.scene.transfer import TransferFunction
 from volref.scene.volume import Volume
@@ -58,7 +59,7 @@ def medium_of(scene: Scene) -> Medium:
     """Prepare the volume of `scene` for the rivals."""
     assert scene.volume is not None
     assert scene.transfer is not None
-    return Medium(field_of(scene), scene.volume, scene.transfer)
+    return Medium(field_of(scene, plan(scene, method="march").everything()), scene.volume, scene.transfer)
 
 
 def steepest_slope(volume: Volume) -> float:

@@ -88,12 +88,11 @@ def _surface_on_the_face() -> Measured:
 def _opaque_without_length() -> Measured:
     """Take spans of length 0, one ulp, and three steps of 0.1 in a table of opacity 1."""
     spans = Spans(np.full(3, 3.0), np.array([3.0, np.nextafter(3.0, 4.0), 3.0 + 0.1 + 0.1 + 0.1]))
-    counts, lengths, last = march.segments_of(spans, 0.1)
-    found = []
-    for count, length, end in zip(counts.tolist(), lengths.tolist(), last.tolist(), strict=True):
-        parts = [length] * (count - 1) + [end] * (count > 0)
-        opacities = [segment_opacities(OPACITY, [1.0], part)[0] for part in parts]
-        found.append(max(opacities, default=0.0))
+    counts, lengths = march.segments_of(spans, 0.1)
+    found = [
+        segment_opacities(OPACITY, [1.0], length)[0] if count else 0.0
+        for count, length in zip(counts.tolist(), lengths.tolist(), strict=True)
+    ]
     naive = textbook.logarithmic_opacity(np.ones(3), spans.t_far - spans.t_near)
     return measured([0.0, 1.0, 1.0], naive, found, 0.0)
 

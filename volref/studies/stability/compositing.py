@@ -19,9 +19,8 @@ def composited(opacities: Floats, color: float = 1.0) -> tuple[Floats, Floats]:
     """Return transmittance (R,) and colour (R,) that volref composites of segments (S, R), one colour."""
     segments, rays = opacities.shape
     transmittance, total = np.ones(rays), np.zeros((3, rays))
-    colors = np.broadcast_to(color, (3, segments, rays))
-    counts = np.full(segments, rays, np.intp)
-    composite.composite_block(transmittance, total, opacities, colors, counts, Workspace())
+    colors = np.full((3, segments, rays), color)
+    composite.composite_block(transmittance, total, opacities, colors, Workspace())
     return transmittance, total[0]
 
 

@@ -79,11 +79,11 @@ def known(
 
 def marched(scene: Scene) -> Floats:
     """Return the pixels (N, 4) of a march with the default step."""
-    return _rendered([scene], "march")[0]
+    return _rendered([scene], "march", tolerance=CERTIFIED)[0]
 
 
 def _marched(scenes: Sequence[Scene], step: float | None, limit: float | None, slack: float) -> Answer:
-    pixels, bounds = _rendered(scenes, "march", step=step)
+    pixels, bounds = _rendered(scenes, "march", step=step, tolerance=CERTIFIED)
     allowed = float(bounds.max()) if limit is None else limit
     return Answer("march", pixels, allowed + slack)
 

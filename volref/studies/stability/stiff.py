@@ -65,7 +65,7 @@ def _thin_sheets() -> Measured:
     shades = np.tile([(1.0, 0.2, 0.1)] * 2 + [(0.1, 0.2, 1.0)] * 2, (4, 1))
     table = steps(np.arange(1.0, 17.0).tolist(), list(shades), [1.0, 0.0] * 8)
     scene = Scene(volume, table, _down(), 4, 4)
-    return known([scene], separable_image(scene), step=1 / 8, march=rounding(128), certified=1e-11)
+    return known([scene], separable_image(scene), step=1 / 6, march=rounding(96), certified=1e-11)
 
 
 def _down() -> Camera:
