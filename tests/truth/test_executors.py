@@ -367,6 +367,24 @@ def test_ctrl_c_cancels_the_rest_and_leaves_nothing(expected, pool, client, wher
         )
 
 
+class Busy(Elsewhere):
+    """Another process that ends its first task and has not begun the others."""
+
+    def submit(self, function, *words):
+        if not self.sent:
+            return super().submit(function, *words)
+        self.sent.append(Future())
+        return self.sent[-1]
+
+
+def test_what_has_not_begun_is_cancelled():
+    busy = Busy()
+    with pytest.raises(KeyboardInterrupt) as raised:
+        vr.render(SCENES["without"], executor=busy, progress=stop_after(1))
+    assert raised.value.__traceback__ is not None  # it holds all that would be tidied up by chance
+    assert [future.cancelled() for future in busy.sent[1:]] == [True] * 8
+
+
 def kill_after_the_first(pid):
     def progress(done, _):
         if done == 1:
