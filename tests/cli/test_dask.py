@@ -9,7 +9,7 @@ import sys
 
 import numpy as np
 import pytest
-from distributed import LocalCluster
+from distributed import KilledWorker, LocalCluster
 
 import volref
 from tests.scenes import rough_scene
@@ -81,6 +81,19 @@ def test_without_dask_the_command_that_installs_it_is_said(scene_file, tmp_path,
         "",
         "volref: distributed must be installed to use --dask, got no module 'distributed'; "
         "run: pip install 'volref[distributed]'\n",
+    )
+
+
+def test_workers_that_die_of_a_task_are_told_in_one_line(scene_file, tmp_path, capsys, monkeypatch):
+    def die(*_, **__):
+        raise KilledWorker("a task", "the last of four", 3)
+
+    monkeypatch.setattr("volref.render", die)
+    status, out, err = render(capsys, scene_file, tmp_path, "local:1")
+    assert (status, out) == (2, "")
+    assert err == (
+        "volref: --dask workers must outlive their tasks, got 4 that died of the same one; "
+        "give each more memory, or start fewer on a machine\n"
     )
 
 

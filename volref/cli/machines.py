@@ -38,13 +38,13 @@ def executor_at(address: str | None) -> Iterator[Executor | None]:
     Raises
     ------
     FormatError
-        If Dask is not installed, the address is none, or nobody works there.
+        If Dask is not installed, the address is none, nobody works there, or workers die of a task.
     """
     if address is None:
         yield None
         return
     try:
-        from distributed import Client, LocalCluster
+        from distributed import Client, KilledWorker, LocalCluster
     except ImportError as error:
         message = f"distributed must be installed to use --dask, got no module {error.name!r}; "
         raise FormatError(message + "run: pip install 'volref[distributed]'") from error
@@ -63,7 +63,14 @@ def executor_at(address: str | None) -> Iterator[Executor | None]:
         _wait_for_workers(client, address)
         if local:
             client.run(_ignore_ctrl_c)
-        yield client.get_executor()
+        try:
+            yield client.get_executor()
+        except KilledWorker as error:
+            message = (
+                f"--dask workers must outlive their tasks, got {error.allowed_failures + 1} that died of the "
+            )
+            message += "same one; give each more memory, or start fewer on a machine"
+            raise FormatError(message) from error
 
 
 def _local_workers(address: str) -> int:
