@@ -250,7 +250,11 @@ def plan(
     occupancy, empty = _empty_space(scene.volume, scene.transfer, length)
     termination, ending = _early_termination(scene.volume, scene.transfer)
     palette, colour = _colour(scene.transfer)
-    kind, rounding, float64 = _precision(scene.volume, scene.transfer, most_segments, tolerance, precision)
+    indices = float(np.linalg.norm(scene.volume.index_from_world[:3, :3], axis=1).max())
+    error = float32_error(
+        scene.volume, scene.transfer, _diagonal(scene.volume), SEGMENTS_PER_BLOCK * length * indices
+    )
+    kind, rounding, float64 = _precision(scene.transfer, error, most_segments, tolerance, precision)
     stages.extend([empty, ending, colour, float64, *_never_needed(), _background_stage(scene)])
     return Plan(
         scene,
@@ -314,7 +318,7 @@ def _colour(transfer: TransferFunction) -> tuple[Palette, Stage]:
 
 
 def _precision(
-    volume: Volume, transfer: TransferFunction, most_segments: int, tolerance: float, precision: str | None
+    transfer: TransferFunction, rounding: float, most_segments: int, tolerance: float, precision: str | None
 ) -> tuple[str, float, Stage]:
     """Choose float32 where what it can change is a small part of the tolerance."""
     name = "float64"
@@ -322,7 +326,6 @@ def _precision(
         one_of("precision", precision, ("float64", "float32"))
     if precision == "float64":
         return "float64", 0.0, Stage(name, included=True, reason="asked for")
-    rounding = float32_error(volume, transfer, _diagonal(volume))
     brightest = max(float(transfer.colors.max()), 1.0)
     most = (rounding + most_segments * float(np.finfo(np.float32).eps)) * brightest
     words = (

@@ -4,8 +4,6 @@ Bit for bit where only empty space and equal colour channels are left out; withi
 where rays end early, colours follow from the weights, or float32 does the sums.
 """
 
-import dataclasses
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -97,7 +95,7 @@ def scenes(draw):
 
 
 @given(scene=scenes(), step=st.sampled_from([None, 0.11, 1.7]), tolerance=st.sampled_from([1.0, 1e-2, 1e-12]))
-@settings(max_examples=300)
+@settings(max_examples=300, deadline=None)
 def test_a_planned_march_is_the_forced_one(scene, step, tolerance):
     plan = vr.plan(scene, method="march", step=step, tolerance=tolerance)
     everything = plan.everything()

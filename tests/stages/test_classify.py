@@ -184,3 +184,12 @@ def test_values_a_few_ulp_apart_are_told_apart():
     transfer = TransferFunction(knots, np.ones((4, 3)), [1.0, 2.0, 4.0, 8.0])
     _, strength = classified(transfer, knots)
     assert strength.tolist() == [1.0, 2.0, 4.0, 8.0]
+
+
+@pytest.mark.parametrize("values", [[-0.1, -0.05, -0.05], [-0.1, -0.0998, 199.1]])
+def test_knots_close_to_each_other_beyond_the_range_are_told_apart(values):
+    table = TransferFunction(values, [(0.1, 0.2, 0.3), (0.5, 0.5, 0.5), (1.0, 0.0, 0.4)], [5.0, 0.0, 0.25])
+    for bounds in ((0.0, 0.0), (0.0, 199.0)):
+        looked_up = lookup_table(table, bounds)
+        _, strength = classify(looked_up, np.zeros(1), Workspace())
+        assert strength[0] == pytest.approx(np.interp(0.0, values, [5.0, 0.0, 0.25]), abs=1e-15)

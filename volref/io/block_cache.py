@@ -174,13 +174,13 @@ def _names(made: Pass) -> tuple[str, str]:
 
 
 def _mapped_file(values: Numbers) -> Path | None:
-    """Return the file that an array shows all of, or None if it lies in memory."""
+    """Return the file that an array is mapped from without gaps, or None."""
     if not values.transpose(in_memory_order(values)).flags.c_contiguous:
         return None
     owner: object = values
     while isinstance(owner, np.ndarray):
         if isinstance(owner, np.memmap) and owner.filename is not None:
-            return Path(owner.filename) if owner.nbytes == values.nbytes else None
+            return Path(owner.filename)
         owner = owner.base
     return None
 

@@ -1,8 +1,10 @@
 """What marching in float32 instead of float64 can change: a bound, from the scene alone.
 
-With u = 2^-24: a sample's padded index is off by at most 5 u N along an axis of N samples (start, stride,
-their product and two sums), so its value by 5 u times the sum over the axes of N times the steepest step,
-and by another 10 u max|v| for the samples, the knots and seven interpolations.  Call that d.  By the identity
+With u = 2^-24: the index of a sample is counted from a whole number near where its block begins, so that it
+is less than M = 4 + 2 S for samples up to S indices away, and off by 2 u M: half an ulp of where the block
+begins, and of the sum.  That makes its value off by 2 u M times the sum over the axes of the steepest steps.
+The samples and the knots are rounded by u max|v| each, and three interpolations one after the other by
+3 u max|v| and 2 u times the steps.  Call all that d.  By the identity
 of `stages.radiance` an extinction that is off by e(t) and a colour that is off by r change the image by at
 most
 
@@ -33,10 +35,11 @@ MOST_OPACITY = 0.999
 _steps: WeakKeyDictionary[Volume, tuple[float, float, float]] = WeakKeyDictionary()
 
 
-def float32_error(volume: Volume, transfer: TransferFunction, longest: float) -> float:
+def float32_error(volume: Volume, transfer: TransferFunction, longest: float, furthest: float) -> float:
     """Return a bound on what float32 changes in any channel of a ray at most `longest` long; inf: unknown.
 
-    It leaves out the roundings of compositing, one unit a segment and operation.
+    Samples lie at most `furthest` indices along any axis from where their block begins.  The roundings of
+    compositing are left out, one unit a segment and operation.
     """
     if max(map(abs, volume.value_bounds)) > 1e30:
         return np.inf
@@ -44,8 +47,8 @@ def float32_error(volume: Volume, transfer: TransferFunction, longest: float) ->
     if slopes is None:
         return np.inf
     steepness, extinction, color_slope = slopes
-    off = 5 * UNIT * float(np.dot(np.array(volume.size) + 2, steepest_steps(volume)))
-    off += 10 * UNIT * max(map(abs, volume.value_bounds))
+    off = UNIT * (2 * (4 + 2 * furthest) + 2) * sum(steepest_steps(volume))
+    off += 5 * UNIT * max(map(abs, volume.value_bounds))
     levels = np.unique(extinction[1])
     depth = min(_split_at(level, steepness, extinction, longest) for level in [np.inf, *levels.tolist()])
     brightest = max(float(transfer.colors.max()), 1.0)

@@ -79,8 +79,8 @@ def lookup_table(
             visible,
         )
 
-    # The nearest knot on each side of the range counts too: it may share a bucket with one inside.
-    near = knots[max(np.searchsorted(knots, low) - 1, 0) : np.searchsorted(knots, high, side="right") + 1]
+    # The nearest two knots on each side of the range count too: they may share a bucket with each other.
+    near = knots[max(np.searchsorted(knots, low) - 2, 0) : np.searchsorted(knots, high, side="right") + 2]
     gap = float(np.diff(near).min()) if len(near) > 1 else max(high - low, 1.0)
     buckets = int(min(np.ceil(2 * (high - low) / gap) + 1, MOST_BUCKETS + 1))
     width = (high - low) / buckets if high > low else gap / 2

@@ -119,8 +119,11 @@ def _grid(flat: Numbers, strides: tuple[int, int, int], last: tuple[int, int, in
     return Grid(corners, strides, np.int32 if flat.size < 2**31 else np.int64, last)
 
 
-def trilinear(grid: Grid, position: Floats, work: Workspace) -> Floats:
+def trilinear(grid: Grid, position: Floats, work: Workspace, corner: Indices | None = None) -> Floats:
     """Return the interpolated value at each padded index position (3, n), in its type; destroys `position`.
+
+    With `corner` (3, b), whole numbers, the positions are counted from there: n = S b of them, S rows of one
+    for each corner.  Small numbers have more digits left after the point, which float32 needs.
 
     v = sum over the corners of v_corner times the product of f or 1 - f per axis, evaluated as seven
     a + f (b - a): exact on constant cells, and off by at most 7 eps max|v| elsewhere.
@@ -129,13 +132,16 @@ def trilinear(grid: Grid, position: Floats, work: Workspace) -> Floats:
     n, dtype = position.shape[1], position.dtype
     base, whole = (work.get(name, n, grid.index_type) for name in ("base", "whole"))
     floor = work.get("floor", n, dtype)
+    if corner is None:
+        corner = np.zeros((3, 1), np.intp)
     for axis in (2, 1, 0):
         fraction = position[axis]
         if grid.last is not None:
-            _hold(fraction, grid.last[axis])
+            _hold(fraction.reshape(-1, corner.shape[1]), grid.last[axis], corner[axis])
         np.copyto(whole, fraction, casting="unsafe")
         if grid.last is not None:
-            np.minimum(whole, max(grid.last[axis] - 1, 0), out=whole)
+            most = max(grid.last[axis] - 1, 0) - corner[axis]
+            np.minimum(whole.reshape(-1, len(most)), most, out=whole.reshape(-1, len(most)), casting="unsafe")
         np.copyto(floor, whole)
         np.subtract(fraction, floor, out=fraction)
         stride = grid.strides[2 - axis]
@@ -145,6 +151,9 @@ def trilinear(grid: Grid, position: Floats, work: Workspace) -> Floats:
             np.copyto(base, whole)
         else:
             np.add(base, whole, out=base)
+    if corner.any():
+        first = (corner * np.array(grid.strides[::-1])[:, None]).sum(axis=0).astype(grid.index_type)
+        np.add(base.reshape(-1, len(first)), first, out=base.reshape(-1, len(first)))
     index = work.get("index", n, np.intp)
     np.copyto(index, base)
     other = work.get("other", n, dtype)
@@ -154,10 +163,12 @@ def trilinear(grid: Grid, position: Floats, work: Workspace) -> Floats:
     return _lerp(along_x[0], along_x[2], position[2])
 
 
-def _hold(position: Floats, last: int) -> None:
-    """Bring padded positions (n,) to those of a bare grid, held to its outer samples, in place."""
+def _hold(position: Floats, last: int, corner: Indices) -> None:
+    """Bring padded positions (S, b) to those of a bare grid, held to its outer samples, in place."""
+    low, high = (np.asarray(end - corner, position.dtype) for end in (0, last))
     np.subtract(position, position.dtype.type(PAD), out=position)
-    np.clip(position, position.dtype.type(0), position.dtype.type(last), out=position)
+    np.maximum(position, low, out=position)
+    np.minimum(position, high, out=position)
 
 
 def cell_corners(grid: Grid, wholes: list[Numbers]) -> list[Floats]:

@@ -49,7 +49,10 @@ ROWS = 8
 
 @dataclass(frozen=True, eq=False)
 class Field:
-    """A volume made ready to be sampled and classified along rays."""
+    """A volume made ready to be sampled and classified along rays.
+
+    reach: how many indices a block of segments goes at most along any axis.
+    """
 
     grid: Grid
     table: Table
@@ -57,6 +60,7 @@ class Field:
     low: Floats
     high: Floats
     color_limit: float
+    reach: float
 
 
 def field_of(scene: Scene, plan: Plan) -> Field:
@@ -74,6 +78,7 @@ def field_of(scene: Scene, plan: Plan) -> Field:
         low,
         high,
         float(transfer.colors.max()),
+        plan.step * SEGMENTS_PER_BLOCK * float(np.linalg.norm(volume.index_from_world[:3, :3], axis=1).max()),
     )
 
 
@@ -173,8 +178,8 @@ def _state_of(plan: Plan, field: Field, origins: Floats, directions: Floats, spa
     count, channels = len(order), plan.palette.composited
     return _State(
         hit,
-        start[:, order].astype(kind),
-        stride[:, order].astype(kind),
+        start[:, order],
+        stride[:, order],
         length[order].astype(kind),
         segments[order],
         blocks[order],
@@ -256,7 +261,7 @@ def _seen(occupancy: Occupancy, start: Floats, stride: Floats, blocks: Indices) 
 
 def _marched(plan: Plan, field: Field, state: _State, work: Workspace) -> Iterator[_State]:
     """March all rays of `state`; yield them as they end."""
-    offsets = _offsets(state)
+    offsets = _offsets(state).astype(state.length.dtype)
     row = 0
     while len(state.blocks) and row < state.blocks[0]:
         if plan.termination > 0:
@@ -277,7 +282,7 @@ def _marched(plan: Plan, field: Field, state: _State, work: Workspace) -> Iterat
 
 def _offsets(state: _State) -> Floats:
     """Return how far the samples of a block lie from its beginning, (3, S, R)."""
-    middles = (np.arange(SEGMENTS_PER_BLOCK) + 0.5).astype(state.stride.dtype)
+    middles = np.arange(SEGMENTS_PER_BLOCK) + 0.5
     return np.asarray(state.stride[:, None] * middles[:, None])
 
 
@@ -296,19 +301,24 @@ def _march_batch(
     plan: Plan, field: Field, state: _State, offsets: Floats, row: int, counts: list[int], work: Workspace
 ) -> None:
     """Sample rows of blocks together, and composite them one after the other, in place."""
-    total, kind = sum(counts), state.stride.dtype
+    total, kind = sum(counts), state.length.dtype
     shape = SEGMENTS_PER_BLOCK, total
     position: Floats = work.get("position", 3 * SEGMENTS_PER_BLOCK * total, kind).reshape(3, *shape)
     lengths: Floats = work.get("lengths", total, kind)
+    whole: Indices = work.get("corners", 3 * total, np.int32).reshape(3, total)
+    # Samples lie behind where their block begins, too; one number for all rays, or rounding would differ.
+    behind = np.ceil(field.reach + 0.5)
     begin = 0
     for number, count in enumerate(counts, start=row):
         columns = slice(begin, begin + count)
         corner = state.stride[:, :count] * state.first[number, :count]
-        corner += state.start[:, :count]
-        np.add(offsets[..., :count], corner[:, None], out=position[..., columns])
+        corner += state.start[:, :count] - behind
+        np.copyto(whole[:, columns], np.floor(corner), casting="unsafe")
+        corner -= whole[:, columns] - behind
+        np.add(offsets[..., :count], corner.astype(kind)[:, None], out=position[..., columns])
         lengths[columns] = state.length[:count]
         begin += count
-    values = trilinear(field.grid, position.reshape(3, -1), work)
+    values = trilinear(field.grid, position.reshape(3, -1), work, whole)
     colors, strength = classify(field.table, values, work)
     opacity = segment_opacity(field.table, strength.reshape(shape), lengths)
     colors = colors.reshape(len(colors), *shape)
@@ -341,5 +351,5 @@ def _finish(field: Field, plan: Plan, state: _State, behind: Floats) -> tuple[Fl
     coarse = over(plan.palette.spread(state.coarse_color), coarse_clear, behind)
     brightest = np.maximum(behind.max(axis=1), max(field.color_limit, 1.0))
     cut = np.where(clear < plan.termination, clear, 0.0)
-    rounding = float(np.finfo(state.stride.dtype).eps) * state.segments + plan.rounding
+    rounding = float(np.finfo(state.length.dtype).eps) * state.segments + plan.rounding
     return rgba, np.abs(rgba - coarse).max(axis=1) + (rounding + cut) * brightest
