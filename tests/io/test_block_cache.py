@@ -153,8 +153,9 @@ DAMAGES = {
     "a key of numbers": lambda path: replaced(path, "key", np.zeros(3)),
     "a long key": lambda path: replaced(path, "key", np.array("x" * 100_000)),
     "a pickled key": lambda path: replaced(path, "key", np.array({}, dtype=object)),
-    "another shape": lambda path: replaced(path, LEAST, np.zeros((8, 8, 9), np.int16)),
-    "another type": lambda path: replaced(path, LEAST, np.zeros((8, 8, 8), np.int32)),
+    "another shape": lambda path: replaced(path, LEAST, np.full((8, 8, 1), -30_000, np.int16)),
+    "another type": lambda path: replaced(path, LEAST, np.full((8, 8, 8), -100, np.int8)),
+    "a larger type": lambda path: replaced(path, LEAST, np.zeros((8, 8, 8), np.int32)),
     "far too large": lambda path: replaced(path, LEAST, np.zeros((8, 8, 800), np.int16)),
     "pickled": lambda path: replaced(path, LEAST, np.full((8, 8, 8), None)),
     "least above greatest": lambda path: replaced(path, LEAST, np.full((8, 8, 8), 30_000, np.int16)),
@@ -224,6 +225,40 @@ def test_a_file_that_changes_while_it_is_mapped_leaves_nothing_behind(file):
     os.utime(file, ns=(1, 1))
     block_ranges(volume, 4, (0, 0, 0))
     assert not cache_path(file).exists()
+
+
+def test_what_is_broken_is_not_copied_to_the_file_that_is_written_next(file, passes):
+    np.save(
+        file, np.random.default_rng(0).integers(0, 9, (99, 98, 97))
+    )  # its headers are read without its ends
+    ranges_of(file)
+    content = cache_path(file).read_bytes()
+    place = content.index(ranges_of(file)[1].astype(np.int64).tobytes())
+    cache_path(file).write_bytes(content[:place] + b"broken" + content[place + 6 :])
+    for _ in range(2):
+        ranges_of(file, (2, 2, 2))
+    assert len(passes) == 2
+    ranges_of(file)
+    assert len(passes) == 3
+
+
+def test_what_is_compressed_is_not_copied_since_it_may_be_of_any_length(file):
+    ranges_of(file)
+    compressed(cache_path(file))
+    ranges_of(file, (2, 2, 2))
+    with np.load(cache_path(file)) as archive:
+        assert sorted(archive) == ["greatest 4 2 2 2", "key", "least 4 2 2 2", "value_bounds"]
+
+
+def test_voxels_in_another_order_have_other_ranges(tmp_path):
+    values = voxels()[:30, :30, :30].copy()
+    file = tmp_path / "cube.npy"
+    np.save(file, values)
+    state = file.stat()
+    ranges_of(file)
+    np.save(file, values.T)  # the same bytes: what the header calls x is z
+    os.utime(file, ns=(state.st_atime_ns, state.st_mtime_ns))
+    assert_right(file, values.T)
 
 
 class Interrupted(BaseException):

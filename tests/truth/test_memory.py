@@ -1,11 +1,11 @@
 """Memory while rendering volumes from disk: the file is mapped, and nothing holds a second copy of it.
 
-What counts is anonymous memory, which the system cannot take back; pages of a mapped file come and go.
+What counts is anonymous memory, which the system cannot take back; pages of a mapped file come and go.  It is
+read from /proc/self/status, so these tests need Linux.
 """
 
 import subprocess
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -37,10 +37,7 @@ out = vr.render(vr.Scene(volume, transfer, camera, 256, 256), method=sys.argv[2]
 print(out.rgba[..., 3].max(), most[0])
 """
 
-pytestmark = [
-    pytest.mark.slow,
-    pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="needs Linux to tell memory from maps"),
-]
+pytestmark = pytest.mark.slow
 
 
 def rendered(path, method):

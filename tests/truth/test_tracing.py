@@ -22,7 +22,7 @@ def scene_with_a_ball(**volume):
 @pytest.mark.parametrize("pixel", [(6, 4), (3, 2), (0, 0), (9, 5)])
 def test_the_result_of_a_trace_is_the_pixel_of_the_image(pixel):
     scene = scene_with_a_ball()
-    out = vr.render(scene, method="march")
+    out = vr.render(scene, method="march", tolerance=1e-12)
     rgba = vr.trace(scene, pixel).head["rgba"]
     # the same operations in the same order, but for powers of a whole array: an ulp per segment
     np.testing.assert_allclose(rgba, out.rgba[pixel[1], pixel[0]], rtol=0, atol=40 * EPS)
