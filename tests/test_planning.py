@@ -25,6 +25,7 @@ def test_every_stage_says_in_or_out_and_why():
     assert [s.name for s in plan.stages] == [
         "meshes",
         "volume",
+        "rays that miss",
         "empty space",
         "early termination",
         "colour",
@@ -39,7 +40,14 @@ def test_every_stage_says_in_or_out_and_why():
 
 def test_every_stage_of_the_exact_method_says_in_or_out_and_why():
     plan = exact_plan(rough_scene())
-    assert [s.name for s in plan.stages] == ["meshes", "volume", "empty space", *NEVER_NEEDED, "background"]
+    assert [s.name for s in plan.stages] == [
+        "meshes",
+        "volume",
+        "rays that miss",
+        "empty space",
+        *NEVER_NEEDED,
+        "background",
+    ]
     assert all(s.reason for s in plan.stages)
     assert str(plan).startswith("method exact\n")
     assert json.loads(json.dumps(plan.as_dict()))["method"] == "exact"
@@ -122,7 +130,12 @@ def test_everything_forces_all_that_was_left_out():
     everything = march_plan(scene).everything()
     assert everything.occupancy is None
     assert everything.termination == 0.0
-    assert [s.name for s in everything.stages if s.included] == ["volume", "colour", "float64"]
+    assert [s.name for s in everything.stages if s.included] == [
+        "volume",
+        "rays that miss",
+        "colour",
+        "float64",
+    ]
     assert (everything.precision, everything.palette) == ("float64", FULL_PALETTE)
     expected = vr.render(scene, plan=march_plan(scene, precision="float64"))
     np.testing.assert_array_equal(vr.render(scene, plan=everything).rgba, expected.rgba)

@@ -14,6 +14,7 @@ import numpy as np
 from volref.arrays import Booleans, Floats, number, one_of
 from volref.errors import SceneError
 from volref.scene.blocks import block_ranges
+from volref.scene.footprint import footprint
 from volref.scene.palette import FULL_PALETTE, Palette, palette_of
 from volref.scene.rounding import float32_error
 from volref.scene.scene import Scene
@@ -138,7 +139,7 @@ class Plan:
         if stage.name in SHORTCUTS:
             return Stage(stage.name, included=False, reason="forced off")
         scene = self.scene
-        needs = {"volume": scene.volume, "colour": scene.volume, "float64": scene.volume}
+        needs = dict.fromkeys(("volume", "rays that miss", "colour", "float64"), scene.volume)
         if needs.get(stage.name) is not None and not stage.included:
             return Stage(stage.name, included=True, reason="forced in")
         return stage
@@ -247,7 +248,10 @@ def plan(
     stages.append(_volume_stage(scene.volume, seen=seen))
     if not seen:
         return Plan(scene, method, length, tolerance, 0.0, 0, None, (*stages, _background_stage(scene)))
-    occupancy, empty = _empty_space(scene.volume, scene.transfer, length)
+    missing, occupancy = _missing(scene), None
+    empty = Stage("empty space", included=False, reason="nothing of the volume is on the screen")
+    if footprint(scene).pixels:
+        occupancy, empty = _empty_space(scene.volume, scene.transfer, length)
     termination, ending = _early_termination(scene.volume, scene.transfer)
     palette, colour = _colour(scene.transfer)
     indices = float(np.linalg.norm(scene.volume.index_from_world[:3, :3], axis=1).max())
@@ -255,7 +259,8 @@ def plan(
         scene.volume, scene.transfer, _diagonal(scene.volume), SEGMENTS_PER_BLOCK * length * indices
     )
     kind, rounding, float64 = _precision(scene.transfer, error, most_segments, tolerance, precision)
-    stages.extend([empty, ending, colour, float64, *_never_needed(), _background_stage(scene)])
+    stages.extend([missing, empty, ending, colour, float64])
+    stages.extend([*_never_needed(), _background_stage(scene)])
     return Plan(
         scene,
         method,
@@ -281,12 +286,20 @@ def _stepless(scene: Scene, method: str, tolerance: float) -> Plan:
         stages.append(_volume_stage(scene.volume, seen=seen))
         if seen:
             reason = "cells that are transparent are not integrated"
+            stages.append(_missing(scene))
             stages.append(
                 Stage("empty space", included=True, reason=reason, saves="their crossings and cubics")
             )
             stages.extend(_never_needed())
     stages.append(_background_stage(scene))
     return Plan(scene, method, 0.0, tolerance, 0.0, 0, None, tuple(stages))
+
+
+def _missing(scene: Scene) -> Stage:
+    """Cast no rays outside the rectangle that the volume's box covers on the screen."""
+    outside = 1 - footprint(scene).pixels / (scene.width * scene.height)
+    reason = f"{outside:.0%} of the pixels lie beside the box of the volume on the screen"
+    return Stage("rays that miss", included=False, reason=reason, saves="their rays")
 
 
 def _never_needed() -> list[Stage]:

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 import volref as vr
 from tests.scenes import camera_towards, rough_scene
 from volref.phantoms.meshes import sphere_mesh
+from volref.scene.footprint import Rectangle
 from volref.truth.canvas import Canvas, light_behind
 from volref.truth.parts import cut, runs, tiles
 from volref.truth.surfaces import visible_surface
@@ -30,7 +31,7 @@ def every_pixel(parts):
 
 @given(st.integers(1, 70), st.integers(1, 40))
 def test_tiles_cover_each_pixel_once_and_are_connected(width, height):
-    parts = tiles(rough_scene(width, height))
+    parts = tiles(rough_scene(width, height), Rectangle(0, width, 0, height))
     assert sorted(every_pixel(parts)) == list(range(width * height))
     for i in range(parts.count):
         y, x = np.divmod(parts.pixels(i), width)

@@ -9,7 +9,7 @@ import numpy as np
 from volref.arrays import Floats, Indices
 from volref.records import Surface
 from volref.scene.scene import Scene
-from volref.truth.parts import runs
+from volref.truth.parts import Parts, runs
 
 # Pixels that are filled with what lies behind the volume, or with what it could be, at a time.
 PIXELS_AT_ONCE = 1 << 14
@@ -49,9 +49,8 @@ class Canvas:
         for pixels in map(parts.pixels, range(parts.count)):
             self.rgba[pixels] = self.behind(pixels)
 
-    def show_anything(self) -> None:
-        """Set each pixel midway between all that it could be, and the bound to half of that."""
-        parts = runs(len(self.bound), PIXELS_AT_ONCE)
+    def show_anything(self, parts: Parts) -> None:
+        """Set each pixel of `parts` midway between all that it could be, and the bound to half of that."""
         for pixels in map(parts.pixels, range(parts.count)):
             self.rgba[pixels], self.bound[pixels] = _anything(self.scene, self.behind(pixels))
 

@@ -17,10 +17,11 @@ import numpy as np
 from volref.arrays import Indices
 from volref.errors import FormatError, SceneError
 from volref.io.references import SHARED
+from volref.scene.footprint import Rectangle
 from volref.truth.canvas import Canvas
 from volref.truth.errands import errand_of, forget, run_errand
 from volref.truth.integration import Integrated, Integration
-from volref.truth.parts import Parts, runs
+from volref.truth.parts import Parts, runs_in
 from volref.truth.workers import results
 
 # Called now and then with (tasks done, tasks in all).
@@ -63,11 +64,11 @@ class Crew:
         """Threads that work; of an executor, those that were seen to."""
         return self.threads if self._executor is None else max(len(self._seen), 1)
 
-    def runs(self, pixels: int, longest: int) -> Parts:
-        """Return the pixels in runs for a march, short enough for all to take part."""
+    def runs(self, rectangle: Rectangle, width: int, longest: int) -> Parts:
+        """Return the pixels of a rectangle in runs for a march, short enough for all to take part."""
         tasks = ENOUGH_TASKS if self._executor is not None else RUNS_PER_THREAD * self.threads
-        length = longest if self.threads == 1 and self._executor is None else -(-pixels // tasks)
-        return runs(pixels, min(longest, max(length, LEAST_RUN)))
+        length = longest if self.threads == 1 and self._executor is None else -(-rectangle.pixels // tasks)
+        return runs_in(rectangle, width, min(longest, max(length, LEAST_RUN)))
 
     def draw(
         self,

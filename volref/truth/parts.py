@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from volref.arrays import Indices
+from volref.scene.footprint import Rectangle
 from volref.scene.scene import Scene
 
 # The exact integrator takes the rays of a tile together: they go through the same cells.
@@ -45,17 +46,40 @@ def runs(pixels: int, length: int) -> Parts:
     )
 
 
+def runs_in(rectangle: Rectangle, width: int, length: int) -> Parts:
+    """Return the pixels of a rectangle of an image `width` wide, row by row, in runs of `length`.
+
+    Examples
+    --------
+    >>> parts = runs_in(Rectangle(1, 3, 0, 2), 4, 3)
+    >>> [parts.pixels(i).tolist() for i in range(parts.count)]
+    [[1, 2, 5], [6]]
+    """
+    inside = runs(rectangle.pixels, length)
+    across = max(rectangle.right - rectangle.left, 1)
+
+    def pixels(number: int) -> Indices:
+        y, x = np.divmod(inside.pixels(number), across)
+        return np.asarray((y + rectangle.top) * width + (x + rectangle.left))
+
+    return Parts(inside.count, pixels)
+
+
 def cut(chosen: Indices, length: int) -> Parts:
     """Return the pixels `chosen` in runs of `length`."""
     return Parts(-(-len(chosen) // length), lambda i: chosen[i * length : (i + 1) * length])
 
 
-def tiles(scene: Scene) -> Parts:
-    """Return the pixels of the image in tiles of TILE_WIDTH x TILE_HEIGHT, smaller where the image ends."""
-    across, down = -(-scene.width // TILE_WIDTH), -(-scene.height // TILE_HEIGHT)
+def tiles(scene: Scene, rectangle: Rectangle) -> Parts:
+    """Return the tiles of TILE_WIDTH x TILE_HEIGHT that touch the rectangle, smaller where the image ends."""
+    left, top = rectangle.left // TILE_WIDTH, rectangle.top // TILE_HEIGHT
+    across, down = -(-rectangle.right // TILE_WIDTH) - left, -(-rectangle.bottom // TILE_HEIGHT) - top
+    if rectangle.pixels == 0:
+        across, down = 1, 0
 
     def pixels(number: int) -> Indices:
         row, column = divmod(number, across)
+        row, column = row + top, column + left
         y = np.arange(row * TILE_HEIGHT, min((row + 1) * TILE_HEIGHT, scene.height), dtype=np.intp)
         x = np.arange(column * TILE_WIDTH, min((column + 1) * TILE_WIDTH, scene.width), dtype=np.intp)
         return np.asarray(y[:, None] * scene.width + x).ravel()

@@ -10,6 +10,7 @@ from volref import planning
 from volref.arrays import number, whole_number
 from volref.errors import SceneError
 from volref.planning import HALF_LEVEL, RAYS_PER_CHUNK, Plan, Stage
+from volref.scene.footprint import Rectangle, footprint
 from volref.scene.scene import Scene
 from volref.truth.canvas import Canvas
 from volref.truth.choosing import Choice, around_each, choose
@@ -95,13 +96,16 @@ def _draw(scene: Scene, plan: Plan, canvas: Canvas, crew: Crew) -> tuple[str, Pl
     """Draw as the plan says; return the kind of the bound, and the plan with the method that answered."""
     if not plan.includes("volume"):
         canvas.show_what_lies_behind()
-        if plan.method == "march":
-            return "estimate", plan
-        return "certified", dataclasses.replace(plan, method="exact")
+        return _nothing_drawn(plan)
+    where = _where(scene, plan)
+    if where.pixels < len(canvas.bound):
+        canvas.show_what_lies_behind()
+    if where.pixels == 0:
+        return _nothing_drawn(plan)
     if crew.deadline < np.inf:
-        canvas.show_anything()
+        canvas.show_anything(tiles(scene, where))
     if plan.method == "march":
-        crew.draw(canvas, Integration(scene, plan), crew.runs(len(canvas.bound), RAYS_PER_CHUNK))
+        crew.draw(canvas, Integration(scene, plan), crew.runs(where, scene.width, RAYS_PER_CHUNK))
         return "estimate", plan
     integration = Integration(scene, plan)
     if plan.method == "auto":
@@ -113,10 +117,27 @@ def _draw(scene: Scene, plan: Plan, canvas: Canvas, crew: Crew) -> tuple[str, Pl
     return "certified", dataclasses.replace(plan, method="exact")
 
 
+def _nothing_drawn(plan: Plan) -> tuple[str, Plan]:
+    """Return the kind of the bound where there is nothing to integrate, and the plan."""
+    return (
+        ("estimate", plan)
+        if plan.method == "march"
+        else ("certified", dataclasses.replace(plan, method="exact"))
+    )
+
+
+def _where(scene: Scene, plan: Plan) -> Rectangle:
+    """Return the pixels whose rays are cast."""
+    if plan.includes("rays that miss"):
+        return Rectangle(0, scene.width, 0, scene.height)
+    return footprint(scene)
+
+
 def _march_then_mend(integration: Integration, choice: Choice, canvas: Canvas, crew: Crew) -> Plan:
     """March, scale the estimates, and integrate exactly the pixels whose estimate exceeds the tolerance."""
     scene, plan = integration.scene, choice.plan
-    crew.draw(canvas, Integration(scene, plan), crew.runs(len(canvas.bound), RAYS_PER_CHUNK))
+    where = _where(scene, plan)
+    crew.draw(canvas, Integration(scene, plan), crew.runs(where, scene.width, RAYS_PER_CHUNK))
     around = around_each(canvas.bound.reshape(scene.height, scene.width))
     np.multiply(around.reshape(-1), choice.factor, out=canvas.bound)
     canvas.bound += plan.termination
@@ -129,7 +150,8 @@ def _march_then_mend(integration: Integration, choice: Choice, canvas: Canvas, c
 
 def _draw_exactly(integration: Integration, canvas: Canvas, crew: Crew) -> None:
     """Integrate every pixel to the tolerance; against a deadline, all of them roughly first."""
-    parts, tolerance = tiles(integration.scene), integration.plan.tolerance
+    scene, plan = integration.scene, integration.plan
+    parts, tolerance = tiles(scene, _where(scene, plan)), plan.tolerance
     timed = crew.deadline < np.inf
     if timed:
         crew.draw(canvas, integration, parts, np.inf, only_better=True)
