@@ -7,13 +7,14 @@ termination, where its effect is below a bound that the result carries.
 import dataclasses
 import math
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from volref.arrays import Booleans, Floats, number, one_of
 from volref.errors import SceneError
-from volref.scene.blocks import block_ranges
+from volref.scene.blocks import flag_blocks
 from volref.scene.footprint import footprint
 from volref.scene.palette import FULL_PALETTE, Palette, palette_of
 from volref.scene.rounding import float32_error
@@ -406,8 +407,7 @@ def _empty_space(volume: Volume, transfer: TransferFunction, step: float) -> tup
     name = "empty space"
     if max(x, y, z) > max(volume.size):
         return None, Stage(name, included=False, reason="one block of segments is longer than the volume")
-    low, high = block_ranges(volume, BLOCK, (x, y, z))
-    occupied = may_be_seen(transfer, low, high)
+    occupied = flag_blocks(volume, BLOCK, (x, y, z), partial(may_be_seen, transfer))
     empty = 1 - float(occupied.mean())
     reason = f"{empty:.0%} of the {BLOCK}^3 blocks are transparent with their surroundings"
     if empty < LEAST_EMPTY_PART:

@@ -230,8 +230,7 @@ spans_as_they_are = spans.box_spans
 
 def lookup_not_held(table, values, work):
     entry = classify._entries(table, values, work)
-    pieces = np.stack(table.pieces)[:, entry]
-    found = pieces.real + pieces.imag * (values - table.start[entry])
+    found = table.base[:, entry] + table.slope[:, entry] * (values - table.start[entry])
     return found[:-1], found[-1]
 
 

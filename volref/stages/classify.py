@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from volref.arrays import Booleans, Floats, Indices, Numbers
+from volref.arrays import Booleans, Floats, Indices
 from volref.scene.transfer import TransferFunction
 from volref.workspace import Workspace
 
@@ -28,21 +28,20 @@ MOST_BUCKETS = 1 << 16
 class Table:
     """A transfer function laid out for lookup, for values in a known range.
 
-    Entry e stands for one linear piece: channel c is `base[e] + slope[e] (value - start[e])` with the complex
-    number base + i slope in `pieces[c]`, so that one gather fetches both.  The channels are the colours that
-    were asked for and, as the last, extinction or opacity (`interpolation`).  `knots` holds the knot of each
-    bucket, or, where buckets would be too many (`scale` is None), all distinct knots.
-    Beyond the two values of `visible` the last channel is 0.
+    Entry e stands for one linear piece: channel c is `base[c][e] + slope[c][e] (value - start[e])`.  The
+    channels are the colours that were asked for and, as the last, extinction or opacity (`interpolation`).
+    `knots` holds the knot of each bucket, or, where buckets would be too many (`scale` is None), all distinct
+    knots; None: buckets begin at knots, and each has one entry.
     """
 
     interpolation: str
     unit_distance: float
     low: float
     scale: float | None
-    knots: Floats
+    knots: Floats | None
     start: Floats
-    pieces: tuple[Numbers, ...]
-    visible: tuple[float, float]
+    base: Floats
+    slope: Floats
 
 
 def lookup_table(
@@ -59,33 +58,35 @@ def lookup_table(
     strength = transfer.opacity if transfer.extinction is None else transfer.extinction
     channels = np.concatenate([transfer.colors.T[list(colors)], np.asarray(strength)[None]])
     knots, start, base, slope = _pieces(transfer.values, channels)
-    visible = _visible(transfer.values, channels[-1])
     low, high = value_bounds
     narrow = np.dtype(dtype)
 
-    def table(low: float, scale: float | None, knots: Floats, entry: Indices | slice) -> Table:
+    def table(low: float, scale: float | None, knots: Floats | None, entry: Indices | slice) -> Table:
         # The channels at a start that was rounded are those at the rounded start.
         rounded = start[entry].astype(narrow)
         shifted = base[:, entry] + slope[:, entry] * (rounded - start[entry])
-        pieces = (shifted + 1j * slope[:, entry]).astype(np.result_type(narrow, np.complex64))
         return Table(
             transfer.interpolation,
             transfer.unit_distance,
             low,
             scale,
-            knots.astype(narrow),
+            None if knots is None else knots.astype(narrow),
             rounded,
-            tuple(pieces),
-            visible,
+            shifted.astype(narrow),
+            slope[:, entry].astype(narrow),
         )
 
     # The nearest two knots on each side of the range count too: they may share a bucket with each other.
     near = knots[max(np.searchsorted(knots, low) - 2, 0) : np.searchsorted(knots, high, side="right") + 2]
     gap = float(np.diff(near).min()) if len(near) > 1 else max(high - low, 1.0)
+    ulp = float(np.finfo(narrow).eps) * max(abs(low), abs(high), 1e-300)
+    even = _even_buckets(near, low, high, gap, ulp) if len(knots) == len(transfer.values) else None
+    if even is not None:
+        begins, length = even
+        return table(begins[0], 1.0 / length, None, np.searchsorted(knots, begins + length / 2, side="right"))
     buckets = int(min(np.ceil(2 * (high - low) / gap) + 1, MOST_BUCKETS + 1))
     width = (high - low) / buckets if high > low else gap / 2
     # A bucket of a few ulp, or one with no finite inverse, could not tell its values apart.
-    ulp = float(np.finfo(narrow).eps) * max(abs(low), abs(high))
     if buckets > MOST_BUCKETS or width < max(16 * ulp, 1e-300):
         return table(low, None, knots, slice(None))
     # One bucket more on each side takes the values that rounding put outside the bounds.
@@ -98,14 +99,25 @@ def lookup_table(
     return table(edges[0], 1.0 / width, knot, entry)
 
 
-def _visible(knots: Floats, strength: Floats) -> tuple[float, float]:
-    """Return the ends of the values that have a strength above 0: the knots just outside, or infinity."""
-    seen = np.flatnonzero(strength)
-    if len(seen) == 0:
-        return np.inf, -np.inf
-    first, last = seen[0], seen[-1]
-    low = knots[first - 1] if first > 0 else -np.inf
-    return low, knots[last + 1] if last + 1 < len(knots) else np.inf
+def _even_buckets(
+    near: Floats, low: float, high: float, gap: float, ulp: float
+) -> tuple[Floats, float] | None:
+    """Return where buckets from below `low` to beyond `high` begin, and their width, if each knot begins one.
+
+    None if the knots `near` do not lie on a grid as wide as the narrowest gap or an eighth of it.  The grid
+    begins some ulp early, so that a knot is never found in the bucket below it: there it would not be exact.
+    """
+    early = 8 * ulp
+    for parts in range(1, 9):
+        width = gap / parts
+        if (high - low) / width > MOST_BUCKETS or width < 64 * early:
+            return None
+        place = (near - near[0]) / width
+        if np.abs(place - np.rint(place)).max() * width <= ulp:
+            first = np.floor((low - near[0]) / width) - 1
+            count = int(np.ceil((high - near[0]) / width) - first) + 2
+            return near[0] - early + width * (first + np.arange(count)), width
+    return None
 
 
 def _pieces(values: Floats, channels: Floats) -> tuple[Floats, Floats, Floats, Floats]:
@@ -137,12 +149,13 @@ def classify(table: Table, values: Floats, work: Workspace) -> tuple[Floats, Flo
     offset = work.get("offset", n, dtype)
     np.take(table.start, entry, out=offset, mode="wrap")
     np.subtract(values, offset, out=offset)
-    result: Floats = work.get("classified", len(table.pieces) * n, dtype).reshape(-1, n)
-    piece = work.get("piece", n, table.pieces[0].dtype)
-    for pieces, out in zip(table.pieces, result, strict=True):
-        np.take(pieces, entry, out=piece, mode="wrap")
-        np.multiply(piece.imag, offset, out=out)
-        np.add(out, piece.real, out=out)
+    result: Floats = work.get("classified", len(table.base) * n, dtype).reshape(-1, n)
+    at_start = work.get("at start", n, dtype)
+    for base, slope, out in zip(table.base, table.slope, result, strict=True):
+        np.take(slope, entry, out=out, mode="wrap")
+        np.multiply(out, offset, out=out)
+        np.take(base, entry, out=at_start, mode="wrap")
+        np.add(out, at_start, out=out)
     np.maximum(result[-1], dtype.type(0), out=result[-1])
     if table.interpolation == "opacity":
         np.minimum(result[-1], dtype.type(1), out=result[-1])
@@ -151,6 +164,7 @@ def classify(table: Table, values: Floats, work: Workspace) -> tuple[Floats, Flo
 
 def _entries(table: Table, values: Floats, work: Workspace) -> Indices:
     if table.scale is None:
+        assert table.knots is not None
         return np.searchsorted(table.knots, values, side="right")
     n = len(values)
     place = work.get("place", n, values.dtype)
@@ -160,6 +174,8 @@ def _entries(table: Table, values: Floats, work: Workspace) -> Indices:
     narrow = work.get("narrow entry", n, np.int32)  # float64 to int32 to int64 is faster than directly
     np.copyto(narrow, place, casting="unsafe")
     np.copyto(entry, narrow)
+    if table.knots is None:
+        return entry
     np.take(table.knots, entry, out=place, mode="wrap")
     from_knot: Booleans = work.get("from knot", n, np.bool_)
     np.greater_equal(values, place, out=from_knot)

@@ -152,7 +152,8 @@ def trilinear(grid: Grid, position: Floats, work: Workspace, corner: Indices | N
         else:
             np.add(base, whole, out=base)
     if corner.any():
-        first = (corner * np.array(grid.strides[::-1])[:, None]).sum(axis=0).astype(grid.index_type)
+        x, y, z = corner.astype(grid.index_type, copy=False)
+        first = (z * grid.strides[0] + y * grid.strides[1]) + x * grid.strides[2]
         np.add(base.reshape(-1, len(first)), first, out=base.reshape(-1, len(first)))
     index = work.get("index", n, np.intp)
     np.copyto(index, base)

@@ -18,7 +18,7 @@ import numpy as np
 from volref.arrays import Booleans, Floats, Indices
 from volref.planning import Plan, may_be_seen
 from volref.records import Pieces, Spans
-from volref.scene.blocks import block_ranges
+from volref.scene.blocks import flag_blocks
 from volref.scene.scene import Scene
 from volref.scene.transform import transform_directions, transform_points
 from volref.scene.volume import Volume
@@ -75,10 +75,9 @@ def prepare(scene: Scene, plan: Plan) -> Prepared:
     half = 1 << (near_shift - 1)
 
     def flags(block: int, reach: int) -> Booleans:
-        low, high = block_ranges(volume, block, (reach, reach, reach))
-        seen = (
-            may_be_seen(transfer, low, high) if plan.includes("empty space") else np.ones(low.shape, np.bool_)
-        )
+        if not plan.includes("empty space"):
+            return np.ones([-(-n // block) + 2 for n in volume.values.shape], np.bool_)
+        seen = flag_blocks(volume, block, (reach, reach, reach), partial(may_be_seen, transfer))
         return np.pad(seen, 1, mode="edge")
 
     cells = CellGrid(

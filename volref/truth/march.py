@@ -20,8 +20,10 @@ sorted by how many are left, so that at any time those that still have one come 
                                     batches of      B B B B
 """
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -43,15 +45,12 @@ BATCH = 6144
 # Rays that have ended early are dropped when they are more than this part of those at work.
 MOST_ENDED = 1 / 8
 
-# Rows of blocks that are looked up together.
-ROWS = 8
-
 
 @dataclass(frozen=True, eq=False)
 class Field:
     """A volume made ready to be sampled and classified along rays.
 
-    reach: how many indices a block of segments goes at most along any axis.
+    reach: more indices than a block of segments goes along any axis.
     """
 
     grid: Grid
@@ -60,7 +59,7 @@ class Field:
     low: Floats
     high: Floats
     color_limit: float
-    reach: float
+    reach: int
 
 
 def field_of(scene: Scene, plan: Plan) -> Field:
@@ -78,7 +77,10 @@ def field_of(scene: Scene, plan: Plan) -> Field:
         low,
         high,
         float(transfer.colors.max()),
-        plan.step * SEGMENTS_PER_BLOCK * float(np.linalg.norm(volume.index_from_world[:3, :3], axis=1).max()),
+        math.ceil(
+            plan.step * SEGMENTS_PER_BLOCK * np.linalg.norm(volume.index_from_world[:3, :3], axis=1).max()
+        )
+        + 1,
     )
 
 
@@ -242,99 +244,103 @@ def _seen(occupancy: Occupancy, start: Floats, stride: Floats, blocks: Indices) 
     begin = ((start - PAD) / BLOCK + np.array(occupancy.layers)[:, None]).astype(kind)
     along = (stride * (SEGMENTS_PER_BLOCK / BLOCK)).astype(kind)
     seen = np.empty((most, count), np.bool_)
-    middles = (np.arange(most) + 0.5).astype(kind)[:, None]
     flags = occupancy.blocks.reshape(-1)
-    for row in range(0, most, ROWS):
-        middle = middles[row : row + ROWS]
-        flat = np.zeros((len(middle), count), np.int32)
-        whole, place = np.empty_like(flat), np.empty(flat.shape, kind)
+    flat, whole, place = np.empty(count, np.int32), np.empty(count, np.int32), np.empty(count, kind)
+    for row in range(most):
+        flat[:] = 0
         for axis, length in zip((2, 1, 0), occupancy.blocks.shape, strict=True):
-            np.multiply(middle, along[axis], out=place)
+            np.multiply(along[axis], row + 0.5, out=place)
             np.add(place, begin[axis], out=place)
             np.copyto(whole, place, casting="unsafe")
             np.multiply(flat, length, out=flat)
             np.add(flat, whole, out=flat)
-        np.take(flags, flat, mode="clip", out=seen[row : row + ROWS])
+        np.take(flags, flat, mode="clip", out=seen[row])
     seen &= np.arange(most)[:, None] < blocks
     return seen
 
 
 def _marched(plan: Plan, field: Field, state: _State, work: Workspace) -> Iterator[_State]:
     """March all rays of `state`; yield them as they end."""
-    offsets = _offsets(state).astype(state.length.dtype)
+    offsets, live = _offsets(field, state), _live(state.blocks)
     row = 0
     while len(state.blocks) and row < state.blocks[0]:
         if plan.termination > 0:
-            live = state.transmittance >= plan.termination
-            ended = len(live) - np.count_nonzero(live)
-            if ended > MOST_ENDED * np.searchsorted(-state.blocks, -row, side="left"):
-                gone = state.take(np.flatnonzero(~live))
+            shining = state.transmittance >= plan.termination
+            if len(shining) - np.count_nonzero(shining) > MOST_ENDED * live[row]:
+                gone = state.take(np.flatnonzero(~shining))
                 gone.blocks = np.minimum(gone.blocks, row)
                 yield gone
-                kept = np.flatnonzero(live)
+                kept = np.flatnonzero(shining)
                 state, offsets = state.take(kept), offsets.take(kept, axis=-1)
+                live = _live(state.blocks)
                 continue
-        counts = _batch(state.blocks, row)
+        counts = _batch(live, row)
         _march_batch(plan, field, state, offsets, row, counts, work)
-        row += len(counts)
+        row += len(counts) - 1
     yield state
 
 
-def _offsets(state: _State) -> Floats:
-    """Return how far the samples of a block lie from its beginning, (3, S, R)."""
+def _offsets(field: Field, state: _State) -> Floats:
+    """Return how far the samples of a block lie from `reach` before its beginning, (3, S, R)."""
     middles = np.arange(SEGMENTS_PER_BLOCK) + 0.5
-    return np.asarray(state.stride[:, None] * middles[:, None])
+    return np.asarray(state.stride[:, None] * middles[:, None] + field.reach, state.length.dtype)
 
 
-def _batch(blocks: Indices, row: int) -> list[int]:
-    """Return how many rays have a block in each of the next rows, as many rows as make a batch."""
-    counts: list[int] = []
-    while row + len(counts) < blocks[0]:
-        count = int(np.searchsorted(-blocks, -(row + len(counts)), side="left"))
-        if counts and sum(counts) + count > BATCH:
-            break
-        counts.append(count)
+def _live(blocks: Indices) -> list[int]:
+    """Return how many of the rays, sorted by falling `blocks`, have one in each row; 0 for the one beyond."""
+    most = int(blocks[0]) if len(blocks) else 0
+    counts: list[int] = np.searchsorted(-blocks, -np.arange(most + 1), side="left").tolist()
     return counts
+
+
+def _batch(live: list[int], row: int) -> list[int]:
+    """Return how many rays have a block in each of the next rows, as make a batch, and in the one after."""
+    end, total = row + 1, live[row]
+    while live[end] and total + live[end] <= BATCH:
+        total, end = total + live[end], end + 1
+    return live[row : end + 1]
 
 
 def _march_batch(
     plan: Plan, field: Field, state: _State, offsets: Floats, row: int, counts: list[int], work: Workspace
 ) -> None:
     """Sample rows of blocks together, and composite them one after the other, in place."""
-    total, kind = sum(counts), state.length.dtype
+    total, kind = sum(counts[:-1]), state.length.dtype
     shape = SEGMENTS_PER_BLOCK, total
     position: Floats = work.get("position", 3 * SEGMENTS_PER_BLOCK * total, kind).reshape(3, *shape)
     lengths: Floats = work.get("lengths", total, kind)
     whole: Indices = work.get("corners", 3 * total, np.int32).reshape(3, total)
-    # Samples lie behind where their block begins, too; one number for all rays, or rounding would differ.
-    behind = np.ceil(field.reach + 0.5)
     begin = 0
-    for number, count in enumerate(counts, start=row):
+    for number, count in enumerate(counts[:-1], start=row):
         columns = slice(begin, begin + count)
         corner = state.stride[:, :count] * state.first[number, :count]
-        corner += state.start[:, :count] - behind
-        np.copyto(whole[:, columns], np.floor(corner), casting="unsafe")
-        corner -= whole[:, columns] - behind
-        np.add(offsets[..., :count], corner.astype(kind)[:, None], out=position[..., columns])
+        corner += state.start[:, :count]
+        np.copyto(whole[:, columns], corner, casting="unsafe")
+        corner -= whole[:, columns]
+        for place, offset, begin_at in zip(position, offsets, corner.astype(kind), strict=True):
+            np.add(offset[:, :count], begin_at, out=place[:, columns])
         lengths[columns] = state.length[:count]
         begin += count
+    whole -= field.reach
     values = trilinear(field.grid, position.reshape(3, -1), work, whole)
     colors, strength = classify(field.table, values, work)
     opacity = segment_opacity(field.table, strength.reshape(shape), lengths)
     colors = colors.reshape(len(colors), *shape)
     begin = 0
-    for number, count in enumerate(counts, start=row):
+    for number, (count, others) in enumerate(pairwise(counts), start=row):
         columns = slice(begin, begin + count)
-        _composite(plan, state, number, opacity[:, columns], colors[..., columns], work)
+        _composite(plan, state, number, others, opacity[:, columns], colors[..., columns], work)
         begin += count
 
 
-def _composite(plan: Plan, state: _State, row: int, opacity: Floats, colors: Floats, work: Workspace) -> None:
-    """Add one row of blocks to the rays that have one, in place."""
+def _composite(
+    plan: Plan, state: _State, row: int, others: int, opacity: Floats, colors: Floats, work: Workspace
+) -> None:
+    """Add one row of blocks to the rays that have one, in place; the first `others` of them have another."""
     count = opacity.shape[1]
     # The last block of a ray may be a half.
-    half = np.flatnonzero(state.segments[:count] - state.first[row, :count] < SEGMENTS_PER_BLOCK)
-    opacity[SEGMENTS_PER_BLOCK // 2 :, half] = 0.0
+    half = np.flatnonzero(state.segments[others:count] - state.first[row, others:count] < SEGMENTS_PER_BLOCK)
+    opacity[SEGMENTS_PER_BLOCK // 2 :, others + half] = 0.0
     if plan.termination > 0:
         ended = np.flatnonzero(state.transmittance[:count] < plan.termination)
         opacity[:, ended] = 0.0

@@ -54,7 +54,9 @@ def _rounded_above_one() -> Measured:
     truth, naive, found = [], [], []
     for low, high, alpha in ((-10.0, 0.001, 0.1), (-3.0, 0.0, 0.08), (-10.0, 0.3, 0.21)):
         value = float(np.nextafter(high, -1))
-        transfer = TransferFunction([low, high], [(1.0, 1.0, 1.0)] * 2, opacity=[alpha, 1.0])
+        # A third knot, or the table would be even and the value taken for the knot's.
+        knots = [low - 0.37 * (high - low), low, high]
+        transfer = TransferFunction(knots, [(1.0, 1.0, 1.0)] * 3, opacity=[alpha, alpha, 1.0])
         strength = looked_up(transfer, np.array([low, value]))
         table = classify.lookup_table(transfer, (low, high))
         found.append(classify.segment_opacity(table, strength, 0.25)[1])
@@ -70,7 +72,8 @@ def _rounded_below_zero() -> Measured:
     low, high, first = 1.4648852660931833, 7.903988519184711, 0.060708408767123245
     value = np.nextafter(high, 0)
     naive = first - first / (high - low) * (value - low)
-    found = looked_up(_white([low, high], [first, 0.0]), np.array([low, value]))[1]
+    table = _white([low - 0.37 * (high - low), low, high], [first, first, 0.0])
+    found = looked_up(table, np.array([low, value]))[1]
     # Turned into light that grows along the ray: only the sign counts.
     return measured(0.0, min(naive, 0.0), min(found, 0.0), 0.0)
 
