@@ -31,8 +31,9 @@ TERMINATION = 1e-6
 # Cells per side of a block of empty space.
 BLOCK = 4
 
-# Segments of a ray that are sampled together (twice a multiple of 3), and rays that are marched together.
-SEGMENTS_PER_BLOCK = 6
+# Segments of a ray that are sampled together, unless that takes them further than some voxels, then 3; and
+# rays that are marched together.
+SEGMENTS_PER_BLOCK, LONGEST_BLOCK = 6, 4.0
 RAYS_PER_CHUNK = 16384
 
 # The part of the tolerance that float32 may take.
@@ -103,6 +104,8 @@ class Plan:
         "float32" or "float64": in what a march computes.
     rounding
         What the precision may change beside the roundings of compositing, in units of the brightest colour.
+    block
+        Segments of a ray that are sampled together, or left out together: 3 or 6.
     """
 
     scene: Scene = field(repr=False)
@@ -116,6 +119,7 @@ class Plan:
     palette: Palette = FULL_PALETTE
     precision: str = "float64"
     rounding: float = 0.0
+    block: int = SEGMENTS_PER_BLOCK
 
     def includes(self, name: str) -> bool:
         """Tell whether the stage `name` takes part."""
@@ -249,16 +253,16 @@ def plan(
     stages.append(_volume_stage(scene.volume, seen=seen))
     if not seen:
         return Plan(scene, method, length, tolerance, 0.0, 0, None, (*stages, _background_stage(scene)))
+    indices = float(np.linalg.norm(scene.volume.index_from_world[:3, :3], axis=1).max())
+    block = SEGMENTS_PER_BLOCK if SEGMENTS_PER_BLOCK * length * indices <= LONGEST_BLOCK else 3
     missing, occupancy = _missing(scene), None
     empty = Stage("empty space", included=False, reason="nothing of the volume is on the screen")
     if footprint(scene).pixels:
-        occupancy, empty = _empty_space(scene.volume, scene.transfer, length)
+        occupancy, empty = _empty_space(scene.volume, scene.transfer, length * block)
     termination, ending = _early_termination(scene.volume, scene.transfer)
     palette, colour = _colour(scene.transfer)
-    indices = float(np.linalg.norm(scene.volume.index_from_world[:3, :3], axis=1).max())
-    error = float32_error(
-        scene.volume, scene.transfer, _diagonal(scene.volume), SEGMENTS_PER_BLOCK * length * indices
-    )
+    furthest = block * length * indices
+    error = float32_error(scene.volume, scene.transfer, _diagonal(scene.volume), furthest)
     kind, rounding, float64 = _precision(scene.transfer, error, most_segments, tolerance, precision)
     stages.extend([missing, empty, ending, colour, float64])
     stages.extend([*_never_needed(), _background_stage(scene)])
@@ -274,6 +278,7 @@ def plan(
         palette,
         kind,
         rounding,
+        block,
     )
 
 
@@ -398,9 +403,9 @@ def _diagonal(volume: Volume) -> float:
     return float(np.linalg.norm(offsets, axis=-1).max())
 
 
-def _empty_space(volume: Volume, transfer: TransferFunction, step: float) -> tuple[Occupancy | None, Stage]:
-    """Mark the blocks that have something visible within half the length of a block of segments."""
-    half = SEGMENTS_PER_BLOCK * step / 2 * (1 + REACH_MARGIN)
+def _empty_space(volume: Volume, transfer: TransferFunction, block: float) -> tuple[Occupancy | None, Stage]:
+    """Mark the cells that have something visible within half the length of a block of segments, `block`."""
+    half = block / 2 * (1 + REACH_MARGIN)
     # A unit step in the world moves at most this many indices along each axis.
     indices_per_length = np.linalg.norm(volume.index_from_world[:3, :3], axis=1)
     x, y, z = (math.ceil(half * count + ROUNDED_INDEX) for count in indices_per_length)

@@ -100,7 +100,7 @@ def march_section(figures: dict[str, Any]) -> str:
     width = figures["pixels"]
     lines = [
         f"Smooth blobs in float32, a table of 256 knots, {width} x {width} pixels, steps of half a voxel,",
-        "one thread. *Plain*: every segment sampled. *Planned*: empty space, early ends and whatever else the",
+        "one thread. *Plain*: every segment sampled. *Planned*: empty space, early ends and what else the",
         "plan leaves out. A nominal sample is one that a plain march takes. The last column is the ratio to",
         "one `take` and one multiplication of a float64 per nominal sample, measured in between. The",
         "estimate of the error is in all of them.",

@@ -9,8 +9,11 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from tests.benchmarks.march import march_section
 from tests.benchmarks.peers.plot import save_plot as peers_plot
 from tests.benchmarks.peers.section import side_by_side
+from tests.benchmarks.scaling import save_plot as scaling_plot
+from tests.benchmarks.scaling import scaling_section
 
 ROOT = Path(__file__).parents[2]
 RESULTS, PAGE = Path(__file__).parent / "results", ROOT / "docs" / "performance.md"
@@ -37,6 +40,14 @@ SECTIONS = {
         side_by_side,
         peers_plot,
         "Root mean square error against CPU seconds, log-log, a panel for each scene.",
+    ),
+    "march": Section("The marcher's kernels", "python -m tests.benchmarks.march", march_section),
+    "scaling": Section(
+        "How the cost grows",
+        "python -m tests.benchmarks.scaling",
+        scaling_section,
+        scaling_plot,
+        "CPU seconds against pixels, segments, voxels and triangles, log-log, beside a proportional line.",
     ),
 }
 

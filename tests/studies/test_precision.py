@@ -167,7 +167,7 @@ def test_a_method_is_run_as_it_is_named(monkeypatch):
         tiny(name, 1e-2 if name != "march" else 1.0)
     assert {words.pop("threads") for words in asked} == {1}
     assert asked == [
-        {"method": "march", "step": 1.0},
+        {"method": "march", "step": 1.0, "tolerance": 1e-12},
         {"method": "exact", "tolerance": 1e-2, "certified": True},
         {"method": "auto", "tolerance": 1e-2, "certified": True},
         {"method": "auto", "tolerance": 1e-2, "certified": False},

@@ -36,12 +36,10 @@ class Palette:
 
     def spread(self, color: Floats) -> Floats:
         """Return the premultiplied colour (3, R) of what was composited in each channel (c, R)."""
-        return np.stack(
-            [
-                color[source].astype(np.float64) * (constant if source < 0 else 1.0)
-                for source, constant in zip(self.source, self.constant, strict=True)
-            ]
-        )
+        spread = np.empty((3, color.shape[1]))
+        for channel, source, constant in zip(spread, self.source, self.constant, strict=True):
+            np.multiply(color[source], constant if source < 0 else 1.0, out=channel)
+        return spread
 
 
 FULL_PALETTE = Palette((0, 1, 2), (0, 1, 2), (0.0, 0.0, 0.0))

@@ -1,10 +1,10 @@
 """What marching in float32 instead of float64 can change: a bound, from the scene alone.
 
-With u = 2^-24: the index of a sample is counted from a whole number near where its block begins, so that it
-is less than M = 4 + 2 S for samples up to S indices away, and off by 2 u M: half an ulp of where the block
-begins, and of the sum.  That makes its value off by 2 u M times the sum over the axes of the steepest steps.
-The samples and the knots are rounded by u max|v| each, and three interpolations one after the other by
-3 u max|v| and 2 u times the steps.  Call all that d.  By the identity
+With u = 2^-24: the index of a sample is counted from a whole number near where its block begins, so that
+it is less than M = 4 + 2 S for samples up to S indices away, and off by 3 u M: the stride, its multiple,
+where the block begins, and two sums.  That makes its value off by 3 u M times the sum over the axes of the
+steepest steps.  The samples and the knots are rounded by u max|v| each, and three interpolations one after
+the other by 3 u max|v| and 2 u times the steps.  Call all that d.  By the identity
 of `stages.radiance` an extinction that is off by e(t) and a colour that is off by r change the image by at
 most
 
@@ -47,7 +47,7 @@ def float32_error(volume: Volume, transfer: TransferFunction, longest: float, fu
     if slopes is None:
         return np.inf
     steepness, extinction, color_slope = slopes
-    off = UNIT * (2 * (4 + 2 * furthest) + 2) * sum(steepest_steps(volume))
+    off = UNIT * (3 * (4 + 2 * furthest) + 2) * sum(steepest_steps(volume))
     off += 5 * UNIT * max(map(abs, volume.value_bounds))
     levels = np.unique(extinction[1])
     depth = min(_split_at(level, steepness, extinction, longest) for level in [np.inf, *levels.tolist()])

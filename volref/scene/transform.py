@@ -26,7 +26,9 @@ def transform_points(matrix: Floats, points: Floats) -> Floats:
     >>> transform_points(affine(np.eye(3), np.array([1.0, 0.0, 0.0])), np.zeros((1, 3)))
     array([[1., 0., 0.]])
     """
-    return transform_directions(matrix, points) + matrix[:3, 3]
+    x, y, z = np.moveaxis(points, -1, 0)
+    parts = [row[0] * x + row[1] * y + row[2] * z + row[3] for row in matrix[:3]]
+    return np.moveaxis(np.stack(parts), 0, -1)
 
 
 def transform_directions(matrix: Floats, directions: Floats) -> Floats:
@@ -36,7 +38,7 @@ def transform_directions(matrix: Floats, directions: Floats) -> Floats:
     ray must not depend on the chunk that it stands in.
     """
     x, y, z = np.moveaxis(directions, -1, 0)
-    return np.stack([row[0] * x + row[1] * y + row[2] * z for row in matrix[:3, :3]], axis=-1)
+    return np.moveaxis(np.stack([row[0] * x + row[1] * y + row[2] * z for row in matrix[:3, :3]]), 0, -1)
 
 
 def invert_affine(name: str, matrix: Floats) -> Floats:

@@ -68,7 +68,8 @@ def over(color: Floats, transmittance: Floats, behind: Floats) -> Floats:
     >>> over(np.array([[0.2], [0.0], [0.0]]), np.array([0.5]), np.array([[0.0, 1.0, 0.0, 1.0]])).tolist()
     [[0.2, 0.5, 0.0, 1.0]]
     """
-    rgba = transmittance[:, None] * behind
-    rgba[:, :3] += color.T
-    rgba[:, 3] += 1.0 - transmittance
-    return rgba
+    rgba = np.empty((4, len(transmittance)))
+    np.multiply(behind.T, transmittance, out=rgba)
+    rgba[:3] += color
+    rgba[3] += 1.0 - transmittance
+    return rgba.T

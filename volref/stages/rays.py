@@ -29,25 +29,27 @@ def pixel_rays(camera: Camera, width: int, height: int, pixels: Indices) -> Rays
     """
     clip = camera.clip_from_view(width, height)
     view_z = -camera.near if camera.is_parallel else -1.0
-    shifted = pixel_ndc(width, height, pixels) - (clip[:2, 2] * view_z + clip[:2, 3])
-    view = np.full((len(pixels), 3), view_z)
-    view[:, :2] = _solve(clip[:2, :2], shifted)
+    x, y = (
+        ndc - (row[2] * view_z + row[3])
+        for ndc, row in zip(pixel_ndc(width, height, pixels).T, clip[:2], strict=True)
+    )
+    view = np.stack([*_solve(clip[:2, :2], x, y), np.full(len(pixels), view_z)]).T
     world_from_view = camera.world_from_view
     if camera.is_parallel:
-        forward = transform_directions(world_from_view, np.array([*_solve(clip[:2, :2], clip[:2, 2]), -1.0]))
+        forward = transform_directions(world_from_view, np.array([*_solve(clip[:2, :2], *clip[:2, 2]), -1.0]))
         directions = np.broadcast_to(forward / np.linalg.norm(forward), view.shape)
         return Rays(transform_points(world_from_view, view), directions)
     directions = transform_directions(world_from_view, view)
-    directions /= np.sqrt((directions**2).sum(axis=1, keepdims=True))
+    x, y, z = directions.T
+    directions /= np.sqrt(x * x + y * y + z * z)[:, None]
     return Rays(np.broadcast_to(world_from_view[:3, 3], view.shape), directions)
 
 
-def _solve(matrix: Floats, right: Floats) -> Floats:
-    """Return the solutions (..., 2) of matrix (2, 2) @ x = right (..., 2), each computed by itself."""
+def _solve(matrix: Floats, x: Floats, y: Floats) -> tuple[Floats, Floats]:
+    """Return the solution of matrix (2, 2) @ (u, v) = (x, y), each computed by itself."""
     (a, b), (c, d) = matrix
-    x, y = right[..., 0], right[..., 1]
     determinant = a * d - b * c
-    return np.stack([(d * x - b * y) / determinant, (a * y - c * x) / determinant], axis=-1)
+    return (d * x - b * y) / determinant, (a * y - c * x) / determinant
 
 
 def pixel_ndc(width: int, height: int, pixels: Indices) -> Floats:
@@ -59,4 +61,4 @@ def pixel_ndc(width: int, height: int, pixels: Indices) -> Floats:
     [[-0.25, 0.5], [-0.75, -0.5]]
     """
     y, x = np.divmod(pixels, width)
-    return np.stack([2 * (x + 0.5) / width - 1, 1 - 2 * (y + 0.5) / height], axis=1)
+    return np.stack([2 * (x + 0.5) / width - 1, 1 - 2 * (y + 0.5) / height]).T

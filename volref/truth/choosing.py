@@ -15,7 +15,7 @@ from volref.arrays import Floats, Indices
 from volref.planning import MOST_DEFAULT_SEGMENTS, Plan
 from volref.scene.scene import Scene
 from volref.truth.exact import Prepared, integrate_pixels
-from volref.truth.march import Field, march_chunk
+from volref.truth.march import field_of, march_chunk
 from volref.workspace import Workspace
 
 # Tiles to try, pixels on a side, and at most this share of the image.
@@ -27,8 +27,17 @@ HELD, MARGIN = 0.999, 2.0
 # The first step tried, in units of the least spacing, and the range of those that may follow from it.
 FIRST_STEP, LEAST_STEP, MOST_STEP = 1.0, 0.05, 4.0
 
+# How many steps are tried, and how much they differ at least.
+TRIES, SAME_STEP = 4, 0.15
+
 # The truth on the tiles is known to this part of the tolerance.
 TRUER = 1e-2
+
+# The marcher is timed on this many times the pixels: a call of NumPy costs as much for few as for many.
+REPEATED = 8
+
+# A pixel that is left takes this many times as long as an average one, to integrate exactly.
+DEAR = 3.0
 
 # The step is aimed at so that this share of the pixels is left to be integrated exactly.
 MOST_LEFT = 0.01
@@ -59,9 +68,7 @@ class _Tried:
     typical: float
 
 
-def choose(
-    scene: Scene, plan: Plan, field: Field, prepared: Prepared, distance: Floats, behind: Floats
-) -> Choice | None:
+def choose(scene: Scene, plan: Plan, prepared: Prepared, distance: Floats, behind: Floats) -> Choice | None:
     """Return how to march `scene` to `plan.tolerance`, or None where integrating exactly is cheaper.
 
     distance (H W,) and behind (H W, 4) are those of all pixels.
@@ -71,6 +78,7 @@ def choose(
         return None
     pixels = tiles.ravel()
     on_tiles = distance[pixels], behind[pixels]
+    many = np.tile(pixels, REPEATED)
     truth = integrate_pixels(scene, prepared, pixels, *on_tiles, max(plan.tolerance * TRUER, 1e-12))
     started = time.perf_counter()
     integrate_pixels(scene, prepared, pixels, *on_tiles, plan.tolerance)
@@ -81,29 +89,37 @@ def choose(
         marching = planning.plan(scene, method="march", step=step, tolerance=plan.tolerance)
         if marching.most_segments > MOST_DEFAULT_SEGMENTS:
             return None
+        field = field_of(scene, marching)
         started = time.perf_counter()
-        chunk = march_chunk(scene, marching, field, pixels, *on_tiles, Workspace())
-        seconds = (time.perf_counter() - started) / len(pixels)
-        error = np.abs(chunk.rgba - truth.rgba).max(axis=1)
-        around = around_each(chunk.bound.reshape(tiles.shape)).ravel()
+        chunk = march_chunk(scene, marching, field, many, distance[many], behind[many], Workspace())
+        seconds = (time.perf_counter() - started) / len(many)
+        error = np.abs(chunk.rgba[: len(pixels)] - truth.rgba).max(axis=1)
+        around = around_each(chunk.bound[: len(pixels)].reshape(tiles.shape)).ravel()
         ratio = np.quantile(error / np.maximum(around, 1e-300), HELD)
         factor = max(float(MARGIN * ratio), LEAST_FACTOR)
         if factor > MOST_FACTOR:
             return None
         left = float((factor * around > plan.tolerance).mean())
         typical = float(np.quantile(factor * around, 1 - MOST_LEFT))
-        return _Tried(marching, factor, seconds + min(left / busy, 1.0) * exactly, typical)
+        return _Tried(marching, factor, seconds + min(DEAR * left / busy, 1.0) * exactly, typical)
 
     assert scene.volume is not None
     voxel = min(scene.volume.spacing)
-    best = tried(FIRST_STEP * voxel)
+    step, best = FIRST_STEP, None
+    for _ in range(TRIES):
+        latest = tried(step * voxel)
+        if latest is None:
+            break
+        if best is None or latest.seconds < best.seconds:
+            best = latest
+        # The error goes with the square of the step.
+        wanted = step * np.sqrt(plan.tolerance / max(latest.typical, 1e-300))
+        wanted = float(np.clip(wanted, LEAST_STEP, MOST_STEP))
+        if abs(wanted / step - 1) < SAME_STEP:
+            break
+        step = wanted
     if best is None:
         return None
-    # The error goes with the square of the step.
-    wanted = FIRST_STEP * np.sqrt(plan.tolerance / max(best.typical, 1e-300))
-    again = tried(float(np.clip(wanted, LEAST_STEP, MOST_STEP)) * voxel)
-    if again is not None and again.seconds < best.seconds:
-        best = again
     return Choice(best.plan, best.factor) if best.seconds < WORTH * exactly else None
 
 

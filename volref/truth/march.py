@@ -28,7 +28,7 @@ from itertools import pairwise
 import numpy as np
 
 from volref.arrays import Booleans, Floats, Indices
-from volref.planning import BLOCK, SEGMENTS_PER_BLOCK, Occupancy, Plan
+from volref.planning import BLOCK, Occupancy, Plan
 from volref.records import Spans
 from volref.scene.scene import Scene
 from volref.scene.transform import transform_directions, transform_points
@@ -77,10 +77,7 @@ def field_of(scene: Scene, plan: Plan) -> Field:
         low,
         high,
         float(transfer.colors.max()),
-        math.ceil(
-            plan.step * SEGMENTS_PER_BLOCK * np.linalg.norm(volume.index_from_world[:3, :3], axis=1).max()
-        )
-        + 1,
+        math.ceil(plan.step * plan.block * np.linalg.norm(volume.index_from_world[:3, :3], axis=1).max()) + 1,
     )
 
 
@@ -109,7 +106,7 @@ class _State:
     length: Floats
     segments: Indices
     blocks: Indices
-    first: Indices
+    first: Floats
     transmittance: Floats
     color: Floats
     coarse_transmittance: Floats
@@ -138,13 +135,15 @@ def march_chunk(
     if field is None:
         return Chunk(behind.copy(), np.zeros(len(pixels)), 0)
     rays = pixel_rays(scene.camera, scene.width, scene.height, pixels)
-    origins = transform_points(field.index_from_world, rays.origins).T
+    eyes = rays.origins if scene.camera.is_parallel else rays.origins[:1]
+    origins = transform_points(field.index_from_world, eyes).T
     directions = transform_directions(field.index_from_world, rays.directions).T
+    origins = np.broadcast_to(origins, directions.shape)
     spans = cut_at_surface(box_spans(origins, directions, field.low, field.high), distance)
     state = _state_of(plan, field, origins, directions, spans)
     rgba, bound, samples = behind.copy(), np.zeros(len(pixels)), 0
     for part in _marched(plan, field, state, work):
-        samples += int((part.blocks * SEGMENTS_PER_BLOCK).sum())
+        samples += int(part.blocks.sum()) * plan.block
         rgba[part.number], bound[part.number] = _finish(field, plan, part, behind[part.number])
     return Chunk(rgba, bound, samples)
 
@@ -170,21 +169,20 @@ def segments_of(spans: Spans, step: float) -> tuple[Indices, Floats]:
 def _state_of(plan: Plan, field: Field, origins: Floats, directions: Floats, spans: Spans) -> _State:
     """Return the rays that have something to march, sorted, before anything is marched."""
     segments, length = segments_of(spans, plan.step)
-    hit = np.flatnonzero(segments)
-    segments, length = segments[hit], length[hit]
-    start = origins[:, hit] + PAD + directions[:, hit] * spans.t_near[hit]
-    stride = directions[:, hit] * length
+    start = directions * np.where(segments > 0, spans.t_near, 0.0)
+    start += origins
+    start += PAD
+    stride = directions * length
     blocks, order, first = _blocks_to_march(plan, start, stride, segments)
-    hit = hit[order]
     kind = field.table.start.dtype
     count, channels = len(order), plan.palette.composited
     return _State(
-        hit,
-        start[:, order],
-        stride[:, order],
-        length[order].astype(kind),
-        segments[order],
-        blocks[order],
+        order,
+        start.take(order, axis=1),
+        stride.take(order, axis=1),
+        length.take(order).astype(kind),
+        segments.take(order),
+        blocks.take(order),
         first,
         np.ones(count, kind),
         np.zeros((channels, count), kind),
@@ -195,46 +193,46 @@ def _state_of(plan: Plan, field: Field, origins: Floats, directions: Floats, spa
 
 def _blocks_to_march(
     plan: Plan, start: Floats, stride: Floats, segments: Indices
-) -> tuple[Indices, Indices, Indices]:
-    """Return how many blocks each ray has (R,), the rays in falling order of that, and their first segments.
+) -> tuple[Indices, Indices, Floats]:
+    """Return how many blocks each ray has (R,), those with any in falling order of that, and their segments.
 
     The last is (b, R) in the new order: the first segment of each block, b of them at most.
     """
-    existing = -(-segments // SEGMENTS_PER_BLOCK)
+    existing = -(-segments // plan.block)
     most = int(existing.max(initial=0))
     occupancy = plan.occupancy
     # An occupancy holds for the step that it was made for.
-    if occupancy is None or plan.step * SEGMENTS_PER_BLOCK / 2 > occupancy.reach * (1 + 1e-9):
+    if occupancy is None or plan.step * plan.block / 2 > occupancy.reach * (1 + 1e-9):
         order = _falling(existing)
-        first = np.arange(0, most * SEGMENTS_PER_BLOCK, SEGMENTS_PER_BLOCK)[:, None]
+        first = np.arange(0.0, most * plan.block, plan.block)[:, None]
         return existing, order, np.broadcast_to(first, (most, len(order)))
-    seen = _seen(occupancy, start, stride, existing)
+    seen = _seen(occupancy, start, stride * plan.block, existing)
     blocks = np.zeros(len(existing), np.intp)
     for row in seen:
         blocks += row
     order = _falling(blocks)
-    order = order[: np.count_nonzero(blocks)]
     place = np.empty(len(blocks), np.intp)
     place[order] = np.arange(len(order))
-    first = np.zeros((int(blocks.max(initial=0)), len(order)), np.intp)
+    first = np.zeros((int(blocks.max(initial=0)), len(order)))
     filled = np.zeros(len(order), np.intp)
     for number, row in enumerate(seen):
-        rays = place[np.flatnonzero(row)]
-        first[filled[rays], rays] = number * SEGMENTS_PER_BLOCK
-        filled[rays] += 1
+        rays = place.take(np.flatnonzero(row))
+        slots = filled.take(rays)
+        first[slots, rays] = number * plan.block
+        filled[rays] = slots + 1
     return blocks, order, first
 
 
 def _falling(counts: Indices) -> Indices:
-    """Return the order that sorts counts from high to low, equal ones as they stand."""
+    """Return the order that sorts counts from high to low, equal ones as they stand, without those of 0."""
     # NumPy sorts 16-bit numbers by their digits, ten times as fast.
     small = len(counts) == 0 or counts.max() < 2**15
     keys = counts.astype(np.int16 if small else np.int64)
-    return np.argsort(np.negative(keys), kind="stable")
+    return np.argsort(np.negative(keys), kind="stable")[: np.count_nonzero(counts)]
 
 
 def _seen(occupancy: Occupancy, start: Floats, stride: Floats, blocks: Indices) -> Booleans:
-    """Tell of each block of each ray whether anything can be seen in it, (most, R).
+    """Tell of each block of each ray, `stride` (3, R) apart, whether anything can be seen in it, (most, R).
 
     The block of cells around the middle of its segments answers for all of them: they lie within its reach.
     """
@@ -242,7 +240,7 @@ def _seen(occupancy: Occupancy, start: Floats, stride: Floats, blocks: Indices) 
     # The occupancy reaches far enough for the rounding of float32 where blocks are few along each axis.
     kind = np.dtype(np.float32 if max(occupancy.blocks.shape) < 2**10 else np.float64)
     begin = ((start - PAD) / BLOCK + np.array(occupancy.layers)[:, None]).astype(kind)
-    along = (stride * (SEGMENTS_PER_BLOCK / BLOCK)).astype(kind)
+    along = (stride / BLOCK).astype(kind)
     seen = np.empty((most, count), np.bool_)
     flags = occupancy.blocks.reshape(-1)
     flat, whole, place = np.empty(count, np.int32), np.empty(count, np.int32), np.empty(count, kind)
@@ -261,7 +259,7 @@ def _seen(occupancy: Occupancy, start: Floats, stride: Floats, blocks: Indices) 
 
 def _marched(plan: Plan, field: Field, state: _State, work: Workspace) -> Iterator[_State]:
     """March all rays of `state`; yield them as they end."""
-    offsets, live = _offsets(field, state), _live(state.blocks)
+    offsets, live = _offsets(field, state, plan.block), _live(state.blocks)
     row = 0
     while len(state.blocks) and row < state.blocks[0]:
         if plan.termination > 0:
@@ -280,10 +278,12 @@ def _marched(plan: Plan, field: Field, state: _State, work: Workspace) -> Iterat
     yield state
 
 
-def _offsets(field: Field, state: _State) -> Floats:
+def _offsets(field: Field, state: _State, block: int) -> Floats:
     """Return how far the samples of a block lie from `reach` before its beginning, (3, S, R)."""
-    middles = np.arange(SEGMENTS_PER_BLOCK) + 0.5
-    return np.asarray(state.stride[:, None] * middles[:, None] + field.reach, state.length.dtype)
+    kind = state.length.dtype
+    offsets = state.stride.astype(kind)[:, None] * (np.arange(block) + 0.5).astype(kind)[:, None]
+    offsets += kind.type(field.reach)
+    return np.asarray(offsets)
 
 
 def _live(blocks: Indices) -> list[int]:
@@ -306,8 +306,8 @@ def _march_batch(
 ) -> None:
     """Sample rows of blocks together, and composite them one after the other, in place."""
     total, kind = sum(counts[:-1]), state.length.dtype
-    shape = SEGMENTS_PER_BLOCK, total
-    position: Floats = work.get("position", 3 * SEGMENTS_PER_BLOCK * total, kind).reshape(3, *shape)
+    shape = plan.block, total
+    position: Floats = work.get("position", 3 * plan.block * total, kind).reshape(3, *shape)
     lengths: Floats = work.get("lengths", total, kind)
     whole: Indices = work.get("corners", 3 * total, np.int32).reshape(3, total)
     begin = 0
@@ -338,9 +338,9 @@ def _composite(
 ) -> None:
     """Add one row of blocks to the rays that have one, in place; the first `others` of them have another."""
     count = opacity.shape[1]
-    # The last block of a ray may be a half.
-    half = np.flatnonzero(state.segments[others:count] - state.first[row, others:count] < SEGMENTS_PER_BLOCK)
-    opacity[SEGMENTS_PER_BLOCK // 2 :, others + half] = 0.0
+    # The last block of a ray may have three segments only.
+    half = np.flatnonzero(state.segments[others:count] - state.first[row, others:count] < plan.block)
+    opacity[3:, others + half] = 0.0
     if plan.termination > 0:
         ended = np.flatnonzero(state.transmittance[:count] < plan.termination)
         opacity[:, ended] = 0.0
@@ -351,11 +351,21 @@ def _composite(
 
 def _finish(field: Field, plan: Plan, state: _State, behind: Floats) -> tuple[Floats, Floats]:
     """Return rgba (R, 4) over what lies behind, and the bound (R,), of marched rays."""
-    clear = state.transmittance.astype(np.float64)
-    rgba = over(plan.palette.spread(state.color), clear, behind)
-    coarse_clear = state.coarse_transmittance.astype(np.float64)
-    coarse = over(plan.palette.spread(state.coarse_color), coarse_clear, behind)
-    brightest = np.maximum(behind.max(axis=1), max(field.color_limit, 1.0))
+    clear, coarse_clear = (
+        values.astype(np.float64) for values in (state.transmittance, state.coarse_transmittance)
+    )
+    color = plan.palette.spread(state.color)
+    rgba = over(color, clear, behind)
+    # By how much the image over what lies behind differs at three times the step.
+    change = plan.palette.spread(state.coarse_color)
+    change -= color
+    coarse_clear -= clear
+    bound = np.abs(coarse_clear * (1.0 - behind[:, 3]))
+    for channel in range(3):
+        change[channel] += coarse_clear * behind[:, channel]
+        np.maximum(bound, np.abs(change[channel]), out=bound)
     cut = np.where(clear < plan.termination, clear, 0.0)
-    rounding = float(np.finfo(state.length.dtype).eps) * state.segments + plan.rounding
-    return rgba, np.abs(rgba - coarse).max(axis=1) + (rounding + cut) * brightest
+    cut += float(np.finfo(state.length.dtype).eps) * state.segments
+    cut += plan.rounding
+    bound += cut * np.maximum(behind.max(axis=1), max(field.color_limit, 1.0))
+    return rgba, bound

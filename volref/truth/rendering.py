@@ -110,7 +110,7 @@ def _draw(scene: Scene, plan: Plan, canvas: Canvas, crew: Crew) -> tuple[str, Pl
     integration = Integration(scene, plan)
     if plan.method == "auto":
         around = canvas.distance, canvas.all_behind()
-        choice = choose(scene, plan, integration.field, integration.prepared, *around)
+        choice = choose(scene, plan, integration.prepared, *around)
         if choice is not None:
             return "estimate", _march_then_mend(integration, choice, canvas, crew)
     _draw_exactly(integration, canvas, crew)
