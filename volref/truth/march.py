@@ -27,8 +27,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from volref.arrays import Booleans, Floats, Indices
-from volref.planning import BLOCK, Occupancy, Plan
+from volref.arrays import Floats, Indices
+from volref.planning import Plan
 from volref.records import Spans
 from volref.scene.scene import Scene
 from volref.scene.transform import transform_directions, transform_points
@@ -37,10 +37,11 @@ from volref.stages.composite import composite_block, composite_block_coarse, ove
 from volref.stages.rays import pixel_rays
 from volref.stages.sampling import PAD, Grid, grid_of, trilinear
 from volref.stages.spans import box_spans, cut_at_surface
+from volref.truth.skipping import blocks_to_march
 from volref.workspace import Workspace
 
-# Blocks that are sampled together: fewer, and NumPy's cost per call shows; more, and they leave the cache.
-BATCH = 6144
+# Samples that are taken together: fewer, and NumPy's cost per call shows; more, and they leave the cache.
+BATCH = 36864
 
 # Rays that have ended early are dropped when they are more than this part of those at work.
 MOST_ENDED = 1 / 8
@@ -173,7 +174,7 @@ def _state_of(plan: Plan, field: Field, origins: Floats, directions: Floats, spa
     start += origins
     start += PAD
     stride = directions * length
-    blocks, order, first = _blocks_to_march(plan, start, stride, segments)
+    blocks, order, first = blocks_to_march(plan, start, stride, segments)
     kind = field.table.start.dtype
     count, channels = len(order), plan.palette.composited
     return _State(
@@ -191,72 +192,6 @@ def _state_of(plan: Plan, field: Field, origins: Floats, directions: Floats, spa
     )
 
 
-def _blocks_to_march(
-    plan: Plan, start: Floats, stride: Floats, segments: Indices
-) -> tuple[Indices, Indices, Floats]:
-    """Return how many blocks each ray has (R,), those with any in falling order of that, and their segments.
-
-    The last is (b, R) in the new order: the first segment of each block, b of them at most.
-    """
-    existing = -(-segments // plan.block)
-    most = int(existing.max(initial=0))
-    occupancy = plan.occupancy
-    # An occupancy holds for the step that it was made for.
-    if occupancy is None or plan.step * plan.block / 2 > occupancy.reach * (1 + 1e-9):
-        order = _falling(existing)
-        first = np.arange(0.0, most * plan.block, plan.block)[:, None]
-        return existing, order, np.broadcast_to(first, (most, len(order)))
-    seen = _seen(occupancy, start, stride * plan.block, existing)
-    blocks = np.zeros(len(existing), np.intp)
-    for row in seen:
-        blocks += row
-    order = _falling(blocks)
-    place = np.empty(len(blocks), np.intp)
-    place[order] = np.arange(len(order))
-    first = np.zeros((int(blocks.max(initial=0)), len(order)))
-    filled = np.zeros(len(order), np.intp)
-    for number, row in enumerate(seen):
-        rays = place.take(np.flatnonzero(row))
-        slots = filled.take(rays)
-        first[slots, rays] = number * plan.block
-        filled[rays] = slots + 1
-    return blocks, order, first
-
-
-def _falling(counts: Indices) -> Indices:
-    """Return the order that sorts counts from high to low, equal ones as they stand, without those of 0."""
-    # NumPy sorts 16-bit numbers by their digits, ten times as fast.
-    small = len(counts) == 0 or counts.max() < 2**15
-    keys = counts.astype(np.int16 if small else np.int64)
-    return np.argsort(np.negative(keys), kind="stable")[: np.count_nonzero(counts)]
-
-
-def _seen(occupancy: Occupancy, start: Floats, stride: Floats, blocks: Indices) -> Booleans:
-    """Tell of each block of each ray, `stride` (3, R) apart, whether anything can be seen in it, (most, R).
-
-    The block of cells around the middle of its segments answers for all of them: they lie within its reach.
-    """
-    most, count = int(blocks.max(initial=0)), len(blocks)
-    # The occupancy reaches far enough for the rounding of float32 where blocks are few along each axis.
-    kind = np.dtype(np.float32 if max(occupancy.blocks.shape) < 2**10 else np.float64)
-    begin = ((start - PAD) / BLOCK + np.array(occupancy.layers)[:, None]).astype(kind)
-    along = (stride / BLOCK).astype(kind)
-    seen = np.empty((most, count), np.bool_)
-    flags = occupancy.blocks.reshape(-1)
-    flat, whole, place = np.empty(count, np.int32), np.empty(count, np.int32), np.empty(count, kind)
-    for row in range(most):
-        flat[:] = 0
-        for axis, length in zip((2, 1, 0), occupancy.blocks.shape, strict=True):
-            np.multiply(along[axis], row + 0.5, out=place)
-            np.add(place, begin[axis], out=place)
-            np.copyto(whole, place, casting="unsafe")
-            np.multiply(flat, length, out=flat)
-            np.add(flat, whole, out=flat)
-        np.take(flags, flat, mode="clip", out=seen[row])
-    seen &= np.arange(most)[:, None] < blocks
-    return seen
-
-
 def _marched(plan: Plan, field: Field, state: _State, work: Workspace) -> Iterator[_State]:
     """March all rays of `state`; yield them as they end."""
     offsets, live = _offsets(field, state, plan.block), _live(state.blocks)
@@ -272,7 +207,7 @@ def _marched(plan: Plan, field: Field, state: _State, work: Workspace) -> Iterat
                 state, offsets = state.take(kept), offsets.take(kept, axis=-1)
                 live = _live(state.blocks)
                 continue
-        counts = _batch(live, row)
+        counts = _batch(live, row, BATCH // plan.block)
         _march_batch(plan, field, state, offsets, row, counts, work)
         row += len(counts) - 1
     yield state
@@ -293,10 +228,10 @@ def _live(blocks: Indices) -> list[int]:
     return counts
 
 
-def _batch(live: list[int], row: int) -> list[int]:
-    """Return how many rays have a block in each of the next rows, as make a batch, and in the one after."""
+def _batch(live: list[int], row: int, most: int) -> list[int]:
+    """Return how many rays have a block in each of the next rows, up to `most`, and in the row after them."""
     end, total = row + 1, live[row]
-    while live[end] and total + live[end] <= BATCH:
+    while live[end] and total + live[end] <= most:
         total, end = total + live[end], end + 1
     return live[row : end + 1]
 
