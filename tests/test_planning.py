@@ -187,3 +187,56 @@ def test_a_range_that_ends_at_the_foot_of_a_ramp_counts_as_seen_since_rounding_m
     assert plan.occupancy.blocks.any()
     flat = vr.Volume(np.full((8, 8, 32), 0.3))  # one value is interpolated without rounding
     assert not march_plan(vr.Scene(flat, transfer, camera_towards(flat), 4, 4)).includes("volume")
+
+
+def smooth_scene(**table):
+    values = np.add.outer(np.add.outer(np.arange(12.0), np.arange(12.0)), np.arange(12.0)) / 33
+    volume = vr.Volume(values)
+    colors = table.pop("colors", [(0.1, 0.2, 0.3), (0.9, 0.8, 0.1)])
+    transfer = vr.TransferFunction([0, 1], colors, **(table or {"extinction": [0.1, 0.4]}))
+    return vr.Scene(volume, transfer, camera_towards(volume), 16, 12)
+
+
+def test_float32_is_chosen_where_its_bound_is_a_small_part_of_the_tolerance():
+    scene = smooth_scene()
+    plan = march_plan(scene)
+    assert (plan.precision, plan.includes("float64")) == ("float32", False)
+    assert 0 < plan.rounding < 1 / 510 / 8
+    assert march_plan(scene, tolerance=plan.rounding).precision == "float64"
+    difference = np.abs(vr.render(scene, plan=plan).rgba - vr.render(scene, plan=plan.everything()).rgba)
+    assert 0 < difference.max() <= plan.rounding + plan.most_segments * 2.0**-23
+
+
+def test_float32_is_never_chosen_where_the_table_jumps_or_is_opaque():
+    jump = dataclasses.replace(
+        smooth_scene(), transfer=vr.TransferFunction([0.5, 0.5], [(1, 1, 1)] * 2, [0, 0.1])
+    )
+    for scene in (jump, smooth_scene(opacity=[0.1, 1.0])):
+        plan = march_plan(scene, tolerance=10.0)
+        assert plan.precision == "float64"
+        assert stage(plan, "float64").reason == "float32 has no bound here"
+
+
+def test_a_precision_that_is_asked_for_is_kept():
+    assert march_plan(smooth_scene(), precision="float64").precision == "float64"
+    scene = smooth_scene(opacity=[0.1, 1.0])
+    asked = march_plan(scene, precision="float32", tolerance=1e-12)
+    assert (asked.precision, asked.rounding) == ("float32", np.inf)
+    assert np.isinf(vr.render(scene, plan=asked).bound).any()
+    with pytest.raises(vr.SceneError, match="precision must be 'float64' or 'float32', got 'half'"):
+        march_plan(smooth_scene(), precision="half")
+
+
+def test_equal_channels_are_looked_up_once_and_constant_ones_not_at_all():
+    grey = march_plan(smooth_scene(colors=[(0.1,) * 3, (0.9,) * 3]))
+    assert (grey.palette.looked_up, stage(grey, "colour").reason) == ((0,), "grey: one channel")
+    white = march_plan(smooth_scene(colors=[(1, 0.5, 0.25)] * 2))
+    assert (white.palette.looked_up, white.includes("colour")) == ((), False)
+    assert stage(white, "colour").reason.startswith("(1, 0.5, 0.25) wherever anything is seen")
+    assert stage(march_plan(smooth_scene()), "colour").included
+
+
+def test_a_colour_that_only_clear_values_have_does_not_count():
+    colors, strength = [(1, 0, 0), (0, 1, 0), (0, 1, 0)], [0.0, 0.0, 1.0]
+    scene = dataclasses.replace(smooth_scene(), transfer=vr.TransferFunction([0, 0.3, 1], colors, strength))
+    assert march_plan(scene).palette.constant == (0.0, 1.0, 0.0)

@@ -1,0 +1,158 @@
+"""Every choice of a rendering resolved to numbers, and what the scene does not need.
+
+A stage is left out where the scene alone proves that it cannot change the image, or, for early
+termination and float32, where its effect is below a bound that the result carries.
+"""
+
+import numpy as np
+
+from volref.arrays import number, one_of
+from volref.errors import SceneError
+from volref.planning.choices import (
+    BLOCK,
+    LONGEST_BLOCK,
+    MOST_DEFAULT_SEGMENTS,
+    TERMINATION,
+    background_stage,
+    colour_stage,
+    diagonal_of,
+    early_termination,
+    empty_space,
+    may_be_seen,
+    meshes_stage,
+    missing_rays,
+    never_needed,
+    precision_of,
+    step_length,
+    volume_stage,
+)
+from volref.planning.record import SEGMENTS_PER_BLOCK, SHORTCUTS, Occupancy, Plan, Stage
+from volref.scene.footprint import footprint
+from volref.scene.rounding import float32_error
+from volref.scene.scene import Scene
+
+__all__ = [
+    "BLOCK",
+    "HALF_LEVEL",
+    "METHODS",
+    "MOST_DEFAULT_SEGMENTS",
+    "RAYS_PER_CHUNK",
+    "SHORTCUTS",
+    "TERMINATION",
+    "Occupancy",
+    "Plan",
+    "Stage",
+    "may_be_seen",
+    "plan",
+]
+
+# Half a level of an 8-bit image: below it a difference cannot be seen after rounding.
+HALF_LEVEL = 1 / 510
+
+# Rays that are marched together: NumPy spends about 1 us on a call, and more no longer fit the cache.
+RAYS_PER_CHUNK = 16384
+
+METHODS = ("auto", "march", "exact")
+
+
+def plan(
+    scene: Scene,
+    *,
+    method: str = "auto",
+    step: float | None = None,
+    tolerance: float = HALF_LEVEL,
+    certified: bool = True,
+    precision: str | None = None,
+) -> Plan:
+    """Decide what rendering `scene` takes, from the scene alone.
+
+    Parameters
+    ----------
+    scene
+        What to draw.
+    method
+        "march", "exact", or "auto": the cheapest whose proven bound meets the tolerance, which is "exact"; if
+        an estimate may do (`certified=False`), `volref.render` measures which is cheaper.
+    step
+        Of "march", in world units; default half the least spacing of the volume.
+    tolerance
+        The error per pixel that is asked for.
+    certified
+        Whether the bound has to be proven.
+    precision
+        Of "march": "float64" or "float32"; default float32 where it provably cannot cost more than an eighth
+        of the tolerance, which halves the time.
+
+    Raises
+    ------
+    SceneError
+        If the method is unknown, the step is not positive, or it would take more than 2^31 samples on one
+        ray (2^20 for the default step).
+    """
+    if not isinstance(scene, Scene):
+        message = f"scene must be a volref.Scene, got {type(scene).__name__}; build or load one first"
+        raise SceneError(message)
+    one_of("method", method, METHODS)
+    number("tolerance", tolerance, above=0)
+    if method == "auto" and certified:
+        method = "exact"
+    if method != "march":
+        if step is not None:
+            message = f"step must be left out unless method is 'march', got {step!r}; pass method='march' too"
+            raise SceneError(message)
+        return _stepless(scene, method, tolerance)
+    stages = [meshes_stage(scene)]
+    if scene.volume is None or scene.transfer is None:
+        stages.append(Stage("volume", included=False, reason="the scene has none"))
+        return Plan(scene, method, 0.0, tolerance, 0.0, 0, None, (*stages, background_stage(scene)))
+    length, most_segments = step_length(scene.volume, step)
+    seen = bool(may_be_seen(scene.transfer, *map(np.array, scene.volume.value_bounds)))
+    stages.append(volume_stage(scene.volume, seen=seen))
+    if not seen:
+        return Plan(scene, method, length, tolerance, 0.0, 0, None, (*stages, background_stage(scene)))
+    indices = float(np.linalg.norm(scene.volume.index_from_world[:3, :3], axis=1).max())
+    block = SEGMENTS_PER_BLOCK if SEGMENTS_PER_BLOCK * length * indices <= LONGEST_BLOCK else 3
+    missing, occupancy = missing_rays(scene), None
+    empty = Stage("empty space", included=False, reason="nothing of the volume is on the screen")
+    if footprint(scene).pixels:
+        occupancy, empty = empty_space(scene.volume, scene.transfer, length * block)
+    termination, ending = early_termination(scene.volume, scene.transfer)
+    palette, colour = colour_stage(scene.transfer)
+    furthest = block * length * indices
+    error = float32_error(scene.volume, scene.transfer, diagonal_of(scene.volume), furthest)
+    kind, rounding, float64 = precision_of(scene.transfer, error, most_segments, tolerance, precision)
+    stages.extend([missing, empty, ending, colour, float64])
+    stages.extend([*never_needed(), background_stage(scene)])
+    return Plan(
+        scene,
+        method,
+        length,
+        tolerance,
+        termination,
+        most_segments,
+        occupancy,
+        tuple(stages),
+        palette,
+        kind,
+        rounding,
+        block,
+    )
+
+
+def _stepless(scene: Scene, method: str, tolerance: float) -> Plan:
+    """Return the plan of a method that chooses its own steps."""
+    stages = [meshes_stage(scene)]
+    if scene.volume is None or scene.transfer is None:
+        stages.append(Stage("volume", included=False, reason="the scene has none"))
+    else:
+        seen = bool(may_be_seen(scene.transfer, *map(np.array, scene.volume.value_bounds)))
+        stages.append(volume_stage(scene.volume, seen=seen))
+        if seen:
+            reason = "cells that are transparent are not integrated"
+            stages.append(missing_rays(scene))
+            stages.append(
+                Stage("empty space", included=True, reason=reason, saves="their crossings and cubics")
+            )
+            stages.extend(never_needed())
+    stages.append(background_stage(scene))
+    return Plan(scene, method, 0.0, tolerance, 0.0, 0, None, tuple(stages))

@@ -1,0 +1,191 @@
+"""The stages one by one: what the scene alone says of each, and what leaving it out saves."""
+
+import math
+from functools import partial
+
+import numpy as np
+
+from volref.arrays import Booleans, Floats, number, one_of
+from volref.errors import SceneError
+from volref.planning.record import Occupancy, Stage
+from volref.scene.blocks import flag_blocks
+from volref.scene.footprint import footprint
+from volref.scene.palette import Palette, palette_of
+from volref.scene.scene import Scene
+from volref.scene.transfer import TransferFunction
+from volref.scene.volume import Volume
+
+# A ray ends when less than this part of the light behind it would arrive.
+TERMINATION = 1e-6
+
+# Cells per side of a block of empty space.
+BLOCK = 4
+
+# Six segments of a ray are sampled together; three where six would go further than this many voxels.
+LONGEST_BLOCK = 4.0
+
+# The part of the tolerance that float32 may take.
+FLOAT32_SHARE = 1 / 8
+
+# Above this many samples on one ray the default step is refused rather than left to run for hours.
+MOST_DEFAULT_SEGMENTS = 1 << 20
+
+# And above this many any step is: 2^31 samples take a minute and a half on one ray.
+MOST_SEGMENTS = 1 << 31
+
+# Segments may be longer than the step by this part of it, and a sample's index be off by this in float32.
+REACH_MARGIN, ROUNDED_INDEX = 1e-12, 1e-3
+
+# Skipping costs one look-up per block of segments; with fewer empty blocks than this it does not pay.
+LEAST_EMPTY_PART = 0.05
+
+HALF_TIME = "about half the time"
+
+
+def missing_rays(scene: Scene) -> Stage:
+    """Cast no rays outside the rectangle that the volume's box covers on the screen."""
+    outside = 1 - footprint(scene).pixels / (scene.width * scene.height)
+    reason = f"{outside:.0%} of the pixels lie beside the box of the volume on the screen"
+    return Stage("rays that miss", included=False, reason=reason, saves="their rays")
+
+
+def never_needed() -> list[Stage]:
+    """Return what no scene of today needs, and why."""
+    return [
+        Stage(
+            "gradients", included=False, reason="no light, and the transfer function is of the value alone"
+        ),
+        Stage("lighting", included=False, reason="no light: colours are emitted as they are"),
+        Stage("jitter", included=False, reason="rays begin where they meet the volume"),
+        Stage("tone mapping", included=False, reason="the image stays in the working space"),
+    ]
+
+
+def colour_stage(transfer: TransferFunction) -> tuple[Palette, Stage]:
+    """Look up each colour channel only once, and none that is constant where anything is seen."""
+    palette, name = palette_of(transfer), "colour"
+    left_out = 3 - len(palette.looked_up)
+    saves = f"{left_out} of 4 channels of look-up and compositing"
+    if left_out == 0:
+        return palette, Stage(name, included=True, reason="red, green and blue differ")
+    if left_out < 3:
+        grey = palette.source == (0, 0, 0)
+        reason = "grey: one channel" if grey else f"{len(palette.looked_up)} channels that differ and vary"
+        return palette, Stage(name, included=True, reason=reason, saves=saves)
+    words = ", ".join(f"{value:g}" for value in palette.constant)
+    reason = f"({words}) wherever anything is seen: it follows from the opacity"
+    return palette, Stage(name, included=False, reason=reason, saves=saves)
+
+
+def precision_of(
+    transfer: TransferFunction, rounding: float, most_segments: int, tolerance: float, precision: str | None
+) -> tuple[str, float, Stage]:
+    """Choose float32 where what it can change is a small part of the tolerance."""
+    name = "float64"
+    if precision is not None:
+        one_of("precision", precision, ("float64", "float32"))
+    if precision == "float64":
+        return "float64", 0.0, Stage(name, included=True, reason="asked for")
+    brightest = max(float(transfer.colors.max()), 1.0)
+    most = (rounding + most_segments * float(np.finfo(np.float32).eps)) * brightest
+    words = (
+        f"float32 may change a pixel by {most:.1e}" if math.isfinite(most) else "float32 has no bound here"
+    )
+    if precision == "float32":
+        return "float32", rounding, Stage(name, included=False, reason=f"asked for; {words}", saves=HALF_TIME)
+    if most > tolerance * FLOAT32_SHARE:
+        return "float64", 0.0, Stage(name, included=True, reason=words)
+    reason = f"{words} at most, of a tolerance of {tolerance:.1e}"
+    return "float32", rounding, Stage(name, included=False, reason=reason, saves=HALF_TIME)
+
+
+def meshes_stage(scene: Scene) -> Stage:
+    """Draw meshes only if there are any."""
+    name = "meshes"
+    if not scene.meshes:
+        saves = "the z-buffer, the cut of the rays and the colour of the surface"
+        return Stage(name, included=False, reason="no mesh", saves=saves)
+    triangles = sum(len(mesh.faces) for mesh in scene.meshes)
+    count = len(scene.meshes)
+    return Stage(name, included=True, reason=f"{count} mesh{'es' * (count > 1)}, {triangles:,} triangles")
+
+
+def background_stage(scene: Scene) -> Stage:
+    """Blend with the background unless it is clear."""
+    if any(scene.background):
+        return Stage("background", included=True, reason=f"premultiplied RGBA {scene.background}")
+    return Stage("background", included=False, reason="clear: nothing to blend with")
+
+
+def volume_stage(volume: Volume, *, seen: bool) -> Stage:
+    """Integrate the volume unless none of its values shows."""
+    low, high = volume.value_bounds
+    if not seen:
+        reason = f"opacity 0 for every value from {low:g} to {high:g}"
+        return Stage("volume", included=False, reason=reason)
+    reason = f"{' x '.join(map(str, volume.size))} {volume.values.dtype}, values {low:g} to {high:g}"
+    return Stage("volume", included=True, reason=reason)
+
+
+def step_length(volume: Volume, step: float | None) -> tuple[float, int]:
+    """Return the length of a segment, and how many the longest ray has."""
+    diagonal = diagonal_of(volume)
+    length = min(volume.spacing) / 2 if step is None else number("step", step, above=0)
+    if step is None and diagonal > length * MOST_DEFAULT_SEGMENTS:
+        message = f"step must be stated for this volume, got the default {length:g}, half the least spacing, "
+        message += (
+            f"which takes {diagonal / length:.3g} samples on a ray of length {diagonal:.3g}; pass step="
+        )
+        raise SceneError(message)
+    if diagonal > length * MOST_SEGMENTS:
+        message = f"step must take at most {MOST_SEGMENTS} samples on a ray of length {diagonal:.3g}, got "
+        raise SceneError(message + f"{length:g}; make it longer than {diagonal / MOST_SEGMENTS:.3g}")
+    return length, math.ceil(diagonal / length)
+
+
+def diagonal_of(volume: Volume) -> float:
+    """Return the longest way through a volume."""
+    offsets = volume.corners[:, None] - volume.corners[None]
+    return float(np.linalg.norm(offsets, axis=-1).max())
+
+
+def empty_space(volume: Volume, transfer: TransferFunction, block: float) -> tuple[Occupancy | None, Stage]:
+    """Mark the cells that have something visible within half the length of a block of segments, `block`."""
+    half = block / 2 * (1 + REACH_MARGIN)
+    # A unit step in the world moves at most this many indices along each axis.
+    indices_per_length = np.linalg.norm(volume.index_from_world[:3, :3], axis=1)
+    x, y, z = (math.ceil(half * count + ROUNDED_INDEX) for count in indices_per_length)
+    name = "empty space"
+    if max(x, y, z) > max(volume.size):
+        return None, Stage(name, included=False, reason="one block of segments is longer than the volume")
+    occupied = flag_blocks(volume, BLOCK, (x, y, z), partial(may_be_seen, transfer))
+    empty = 1 - float(occupied.mean())
+    reason = f"{empty:.0%} of the {BLOCK}^3 blocks are transparent with their surroundings"
+    if empty < LEAST_EMPTY_PART:
+        return None, Stage(name, included=False, reason=f"{reason}: looking for them would cost more")
+    # One index more than the reach: a "cell" volume begins half an index before its first block.
+    layers = (1 + x // BLOCK, 1 + y // BLOCK, 1 + z // BLOCK)
+    blocks = np.pad(occupied, [(layers[axis], layers[axis]) for axis in (2, 1, 0)], mode="edge")
+    return Occupancy(blocks, layers, half), Stage(
+        name, included=True, reason=reason, saves="the samples there"
+    )
+
+
+def may_be_seen(transfer: TransferFunction, low: Floats, high: Floats) -> Booleans:
+    """Tell whether anything interpolated between samples from `low` to `high` can have an opacity above 0.
+
+    Interpolation may leave the range of its corners by rounding, unless they are all one value.
+    """
+    slack = np.where(high > low, 8 * np.finfo(np.float64).eps * np.maximum(abs(low), abs(high)), 0.0)
+    return transfer.is_visible(low - slack, high + slack)
+
+
+def early_termination(volume: Volume, transfer: TransferFunction) -> tuple[float, Stage]:
+    """End rays early where their optical depth can be great enough."""
+    name = "early termination"
+    most = transfer.most_extinction(*volume.value_bounds) * diagonal_of(volume)
+    if most < -math.log(TERMINATION):
+        reason = f"the optical depth of a ray cannot exceed {most:.3g}"
+        return 0.0, Stage(name, included=False, reason=reason)
+    reason = f"a ray ends below a transmittance of {TERMINATION:g}, and the bound counts what it left"
+    return TERMINATION, Stage(name, included=True, reason=reason, saves="the samples behind it")
