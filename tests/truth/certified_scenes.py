@@ -4,8 +4,11 @@ The images are 24 x 24, so that a few random rays of each cost little; the volum
 that matters.  `KINDS` names the groups; `certified_scenes` yields (name, scene) of all or some of them.
 """
 
+from pathlib import Path
+
 import numpy as np
 
+import volref
 from volref import Camera, Mesh, Scene, TransferFunction, Volume, load_scene, load_volume
 from volref.phantoms import fields
 from volref.phantoms import transfer as tables
@@ -70,7 +73,7 @@ def real_ct():
     stent = load_volume("tests/data/ct_stent_128x128x256_u8.npz")
     # Whole numbers at the samples, and knots at whole numbers: cells that are constant on a knot.
     yield from _both("stent", stent, TransferFunction([2, 8, 12, 20, 32], COLORS, [0, 0.02, 0.0, 0.3, 1.0]))
-    head = load_scene("volref/demo_data/scene.json")
+    head = load_scene(Path(volref.__file__).parent / "demo_data" / "scene.json")
     yield "head", Scene(head.volume, head.transfer, head.camera, SIDE, SIDE, head.meshes, head.background)
 
 

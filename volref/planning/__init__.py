@@ -50,7 +50,7 @@ __all__ = [
 HALF_LEVEL = 1 / 510
 
 # Rays that are marched together: NumPy spends about 1 us on a call, and more no longer fit the cache.
-RAYS_PER_CHUNK = 16384
+RAYS_PER_CHUNK = 32768
 
 METHODS = ("auto", "march", "exact")
 
