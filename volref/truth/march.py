@@ -40,8 +40,9 @@ from volref.stages.spans import box_spans, cut_at_surface
 from volref.truth.skipping import blocks_to_march
 from volref.workspace import Workspace
 
-# Samples that are taken together: fewer, and NumPy's cost per call shows; more, and they leave the cache.
-BATCH = 36864
+# Bytes of the samples that are taken together: fewer, and NumPy's cost per call shows; more, and they leave the
+# cache.
+BATCH = 147456
 
 # Rays that have ended early are dropped when they are more than this part of those at work.
 MOST_ENDED = 1 / 8
@@ -207,7 +208,7 @@ def _marched(plan: Plan, field: Field, state: _State, work: Workspace) -> Iterat
                 state, offsets = state.take(kept), offsets.take(kept, axis=-1)
                 live = _live(state.blocks)
                 continue
-        counts = _batch(live, row, BATCH // plan.block)
+        counts = _batch(live, row, BATCH // (plan.block * state.length.itemsize))
         _march_batch(plan, field, state, offsets, row, counts, work)
         row += len(counts) - 1
     yield state
