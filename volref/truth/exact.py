@@ -35,7 +35,7 @@ from volref.workspace import Workspace
 MOST_PASSES = 40
 
 # Pieces whose models are integrated together, and into how many parts one is cut at most.
-BATCH, MOST_PARTS = 1 << 15, 16
+BATCH, MOST_PARTS = 1 << 16, 16
 
 # Above this many pieces of a batch none is cut any more, and the bound stands as it is.
 MOST_PIECES = 1 << 20

@@ -40,8 +40,7 @@ from volref.stages.spans import box_spans, cut_at_surface
 from volref.truth.skipping import blocks_to_march
 from volref.workspace import Workspace
 
-# Bytes of the samples that are taken together: fewer, and NumPy's cost per call shows; more, and they leave the
-# cache.
+# Bytes of the samples taken together: fewer, and NumPy's cost per call shows; more, and they leave the cache.
 BATCH = 147456
 
 # Rays that have ended early are dropped when they are more than this part of those at work.

@@ -9,8 +9,10 @@ from volref.arrays import Indices
 from volref.scene.footprint import Rectangle
 from volref.scene.scene import Scene
 
-# The exact integrator takes the rays of a tile together: they go through the same cells.
+# The exact integrator takes the rays of a tile together: they go through the same cells.  Tiles of large
+# images are twice as wide and high, so that NumPy has more to do per call.
 TILE_WIDTH, TILE_HEIGHT = 32, 16
+LARGE_IMAGE = 1 << 18
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,17 +73,22 @@ def cut(chosen: Indices, length: int) -> Parts:
 
 
 def tiles(scene: Scene, rectangle: Rectangle) -> Parts:
-    """Return the tiles of TILE_WIDTH x TILE_HEIGHT that touch the rectangle, smaller where the image ends."""
-    left, top = rectangle.left // TILE_WIDTH, rectangle.top // TILE_HEIGHT
-    across, down = -(-rectangle.right // TILE_WIDTH) - left, -(-rectangle.bottom // TILE_HEIGHT) - top
+    """Return the tiles of TILE_WIDTH x TILE_HEIGHT, or twice that, that touch the rectangle.
+
+    They are smaller where the image ends.
+    """
+    times = 2 if scene.width * scene.height >= LARGE_IMAGE else 1
+    tile_width, tile_height = times * TILE_WIDTH, times * TILE_HEIGHT
+    left, top = rectangle.left // tile_width, rectangle.top // tile_height
+    across, down = -(-rectangle.right // tile_width) - left, -(-rectangle.bottom // tile_height) - top
     if rectangle.pixels == 0:
         across, down = 1, 0
 
     def pixels(number: int) -> Indices:
         row, column = divmod(number, across)
         row, column = row + top, column + left
-        y = np.arange(row * TILE_HEIGHT, min((row + 1) * TILE_HEIGHT, scene.height), dtype=np.intp)
-        x = np.arange(column * TILE_WIDTH, min((column + 1) * TILE_WIDTH, scene.width), dtype=np.intp)
+        y = np.arange(row * tile_height, min((row + 1) * tile_height, scene.height), dtype=np.intp)
+        x = np.arange(column * tile_width, min((column + 1) * tile_width, scene.width), dtype=np.intp)
         return np.asarray(y[:, None] * scene.width + x).ravel()
 
     return Parts(across * down, pixels)
