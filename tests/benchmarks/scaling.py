@@ -159,6 +159,8 @@ def save_plot(figures: dict[str, Any], path: Path) -> None:
 
 def draw(figures: dict[str, Any], figure: "Figure") -> None:
     """Draw a panel for each of the four, with a line of slope 1."""
+    from matplotlib.ticker import NullFormatter
+
     panels = figure.subplots(1, len(TITLES), sharey=True)
     for axes, (name, title) in zip(panels, TITLES.items(), strict=True):
         points = figures[name]
@@ -166,6 +168,7 @@ def draw(figures: dict[str, Any], figure: "Figure") -> None:
         axes.loglog(x, seconds, "o-", color="#1F4E79", label="measured")
         axes.loglog(x, [seconds[-1] * at / x[-1] for at in x], "--", color="#8A8A8A", label="proportional")
         axes.set_xlabel(title)
+        axes.xaxis.set_minor_formatter(NullFormatter())
         axes.grid(visible=True, which="both", alpha=0.25)
     panels[0].set_ylabel("CPU seconds, one thread")
     panels[0].legend()
