@@ -20,7 +20,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from volref.arrays import Floats
+from volref.arrays import Floats, Numbers
 from volref.scene.transfer import TransferFunction
 from volref.scene.volume import Volume
 
@@ -62,14 +62,28 @@ def steepest_steps(volume: Volume) -> tuple[float, float, float]:
         thick = max(SLAB // max(values[0].size, 1), 1)
         steps = np.zeros(3)
         for first in range(0, len(values), thick):
-            slab = values[first : first + thick + 1].astype(np.float64)
+            slab = values[first : first + thick + 1]
             for axis in range(3):
-                difference = np.diff(slab, axis=axis)
-                if difference.size:
-                    most = max(float(difference.max()), -float(difference.min()))
-                    steps[2 - axis] = max(steps[2 - axis], most)
+                planes = np.moveaxis(slab, axis, 0)
+                if len(planes) > 1:
+                    steps[2 - axis] = max(steps[2 - axis], _greatest_difference(planes[1:], planes[:-1]))
         _steps[volume] = (float(steps[0]), float(steps[1]), float(steps[2]))
     return _steps[volume]
+
+
+def _greatest_difference(a: Numbers, b: Numbers) -> float:
+    """Return the greatest |a - b|, computed in the arrays' own type: bytes take an eighth of the time.
+
+    Examples
+    --------
+    >>> _greatest_difference(np.array([-128, 3], np.int8), np.array([127, 1], np.int8))
+    255.0
+    """
+    difference = np.maximum(a, b)
+    difference -= np.minimum(a, b)
+    if difference.dtype.kind == "i":  # the difference of two signed numbers may need the sign's bit
+        difference = difference.view(difference.dtype.str.replace("i", "u"))
+    return float(difference.max())
 
 
 def _slopes(transfer: TransferFunction, low: float, high: float) -> tuple[Floats, Floats, float] | None:
