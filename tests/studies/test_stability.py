@@ -9,10 +9,11 @@ import pytest
 import volref.studies.stability.catalogue as catalogue
 import volref.studies.stability.run as running
 from tests.docs.pages import DOCS
-from volref import image, planning
+from volref import image
 from volref.cli import main
 from volref.errors import SceneError
 from volref.phantoms.scenes import homogeneous_scene
+from volref.planning import choices
 from volref.records import Spans
 from volref.scene import camera as camera_module
 from volref.scene import mesh as mesh_module
@@ -378,7 +379,7 @@ def test_a_case_fails_when_what_it_guards_is_broken(original, broken, name, monk
 
 
 def test_rays_that_end_too_early_fail_the_thick_slab(monkeypatch):
-    monkeypatch.setattr(planning, "TERMINATION", 1e-3)
+    monkeypatch.setattr(choices, "TERMINATION", 1e-3)
     assert not run_stability(only=["optical-depth-40"]).passed
 
 
