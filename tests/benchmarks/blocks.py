@@ -6,12 +6,11 @@ of asking again, which looks at no voxel; and how much memory the pass took, its
 """
 
 import sys
-import time
 import tracemalloc
-from collections.abc import Callable
 
 import numpy as np
 
+from tests.benchmarks.stopwatch import cpu_seconds
 from volref.scene.blocks import block_ranges, flag_blocks
 from volref.scene.volume import Volume
 
@@ -19,16 +18,6 @@ SIZES = ((64, np.float64), (128, np.float32), (256, np.float32), (512, np.uint8)
 
 # Blocks and reaches as the integrators ask for them; 4 and 2 is a march with the default step.
 ASKED = ((4, 0), (4, 2), (8, 4))
-
-
-def cpu_seconds(work: Callable[[], object], repeats: int = 3) -> float:
-    """Return the least CPU time of a few runs: the others were disturbed."""
-    times = []
-    for _ in range(repeats):
-        start = time.process_time()
-        work()
-        times.append(time.process_time() - start)
-    return min(times)
 
 
 def measure(values: np.ndarray, block: int, reach: int) -> tuple[float, float, float]:

@@ -9,8 +9,6 @@ take-and-multiply per nominal sample in the same run: machines differ, the ratio
 import dataclasses
 import json
 import sys
-import time
-from collections.abc import Callable
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -18,6 +16,7 @@ from typing import Any
 import numpy as np
 
 import volref as vr
+from tests.benchmarks.stopwatch import cpu_seconds
 from volref.phantoms.fields import gaussian_blobs
 from volref.phantoms.transfer import smooth_curve_256
 from volref.studies.precision.machine import this_machine
@@ -35,16 +34,6 @@ def bench_scene(side: int, pixels: int = PIXELS) -> vr.Scene:
     eye = center + np.array([2.1, 1.4, 1.7]) * (side - 1) / 2 * 1.35
     camera = vr.Camera.look_at(eye, center, (0, 0, 1), 40, 0.1, 1e4)
     return vr.Scene(volume, transfer, camera, pixels, pixels)
-
-
-def cpu_seconds(work: Callable[[], object], repeats: int = 5) -> float:
-    """Least CPU time of a few runs: the others were disturbed."""
-    times = []
-    for _ in range(repeats):
-        start = time.process_time()
-        work()
-        times.append(time.process_time() - start)
-    return min(times)
 
 
 def calibration(samples: int) -> float:

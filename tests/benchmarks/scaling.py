@@ -16,7 +16,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import volref as vr
-from tests.benchmarks.march import bench_scene, cpu_seconds
+from tests.benchmarks.march import bench_scene
+from tests.benchmarks.stopwatch import cpu_seconds
 from tests.oracles.meshes import bumpy_sphere
 from volref.io.atomic import atomic_path
 from volref.report.plots import check_matplotlib

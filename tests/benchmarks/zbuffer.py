@@ -6,11 +6,9 @@ take-and-multiply pass over as many elements as there are fragments, measured in
 differ, the ratio less so.
 """
 
-import time
-from collections.abc import Callable
-
 import numpy as np
 
+from tests.benchmarks.stopwatch import cpu_seconds
 from tests.oracles.meshes import bumpy_sphere
 from volref.scene.camera import Camera
 from volref.scene.scene import Scene
@@ -18,17 +16,6 @@ from volref.stages.clipping import project
 from volref.truth.surfaces import nearest_faces, visible_surface
 
 WIDTH = HEIGHT = 512
-REPEATS = 9
-
-
-def cpu_seconds(run: Callable[[], object]) -> float:
-    """Return the least CPU time of a few runs."""
-    times = []
-    for _ in range(REPEATS):
-        started = time.process_time()
-        run()
-        times.append(time.process_time() - started)
-    return min(times)
 
 
 def sphere_scene(triangles: int, near: float = 0.1) -> Scene:

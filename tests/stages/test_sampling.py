@@ -6,7 +6,8 @@ from scipy import ndimage
 
 from tests.oracles import scalar
 from volref import Volume
-from volref.stages.sampling import PAD, padded_grid, trilinear
+from volref.stages import sampling
+from volref.stages.sampling import PAD, bare_grid, cell_corners, padded_grid, trilinear
 from volref.workspace import Workspace
 
 EPS = np.finfo(np.float64).eps
@@ -118,3 +119,76 @@ def test_rounding_past_the_far_face_still_reads_the_border():
 
 def test_the_grid_keeps_the_type_of_the_volume():
     assert padded_grid(Volume(np.zeros((3, 3, 3), np.uint8))).corners[0].dtype == np.uint8
+
+
+# --- a volume that is left where it lies
+
+
+def bare_volume(seed, order, centering, dtype=np.uint8, shape=(4, 5, 6)):
+    values = (np.random.default_rng(seed).random(shape) * 200).astype(dtype)
+    return Volume(np.asarray(values, order=order), centering=centering)
+
+
+def points_within(volume, seed, count=300):
+    """Padded positions (3, n) in the whole extent, its corners, faces and samples among them."""
+    low, high = volume.index_bounds
+    rng = np.random.default_rng(seed)
+    points = low + rng.random((count, 3)) * (high - low)
+    points[: count // 3] = np.where(rng.random((count // 3, 3)) < 0.5, low, high)
+    points[count // 3 : count // 2] = np.clip(np.rint(points[count // 3 : count // 2]), low, high)
+    return points.T + PAD
+
+
+SHAPES = [(4, 5, 6), (1, 5, 6), (4, 1, 6), (4, 5, 1), (2, 2, 2)]
+
+
+@pytest.mark.parametrize("order", ["C", "F"])
+@pytest.mark.parametrize(
+    ("shape", "centering"), [*((shape, "cell") for shape in SHAPES), ((4, 5, 6), "node"), ((2, 2, 2), "node")]
+)
+def test_a_bare_grid_is_the_same_field_as_a_padded_one(shape, centering, order):
+    volume = bare_volume(0, order, centering, np.float32, shape)
+    positions = points_within(volume, 1)
+    padded = trilinear(padded_grid(volume), positions.copy(), Workspace()).copy()
+    bare = trilinear(bare_grid(volume), positions.copy(), Workspace())
+    # The fractions are those of other whole numbers: an ulp of 8, times differences of 200.
+    np.testing.assert_allclose(bare, padded, rtol=0, atol=200 * 8 * EPS)
+
+
+@pytest.mark.parametrize("order", ["C", "F"])
+@pytest.mark.parametrize("shape", SHAPES)
+def test_cells_of_a_bare_grid_have_the_corners_of_a_padded_one(shape, order):
+    volume = bare_volume(3, order, "cell", shape=shape)
+    nz, ny, nx = shape
+    wholes = [
+        whole.ravel()
+        for whole in np.meshgrid(np.arange(nx + 1), np.arange(ny + 1), np.arange(nz + 1), indexing="ij")
+    ]
+    for bare, padded in zip(
+        cell_corners(bare_grid(volume), wholes), cell_corners(padded_grid(volume), wholes), strict=True
+    ):
+        np.testing.assert_array_equal(bare, padded)
+
+
+@pytest.mark.parametrize("make", [padded_grid, bare_grid])
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_positions_may_be_counted_from_whole_corners(make, dtype):
+    volume = bare_volume(4, "C", "cell")
+    positions = points_within(volume, 5)
+    corner = np.floor(positions).astype(np.int32) - 3
+    grid = make(volume)
+    whole = trilinear(grid, positions.copy(), Workspace()).copy()
+    relative = trilinear(grid, (positions - corner).astype(dtype), Workspace(), corner)
+    # Relative positions are below 4: half an ulp of that, times the differences of 200 along three axes, and
+    # the roundings of seven interpolations.
+    np.testing.assert_allclose(relative, whole, rtol=0, atol=200 * 16 * np.finfo(dtype).eps)
+
+
+def test_only_large_mapped_volumes_are_left_where_they_lie(tmp_path, monkeypatch):
+    monkeypatch.setattr(sampling, "MOST_COPIED", 100)
+    np.save(tmp_path / "values.npy", np.zeros((5, 5, 5), np.uint8))
+    mapped = np.load(tmp_path / "values.npy", mmap_mode="r")
+    assert sampling.grid_of(Volume(mapped)).last == (4, 4, 4)
+    assert sampling.grid_of(Volume(np.array(mapped))).last is None
+    assert sampling.grid_of(Volume(mapped[:2])).last is None  # small
+    assert sampling.grid_of(Volume(mapped[::-1])).last is None  # not one after the other

@@ -5,7 +5,6 @@ outside its certificate, or could be.
 """
 
 import dataclasses
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -426,14 +425,6 @@ def test_a_transparent_volume_leaves_what_lies_behind_it():
     rgba, bound = shoot(noise(), table([2.0, 3.0], [0, 1.0]), *some_rays(), behind=GREEN)
     assert (rgba == GREEN).all()
     assert (bound <= 1e-13).all()
-
-
-def test_without_a_volume_the_light_behind_is_exact():
-    found = exact.integrate_pixels(
-        SimpleNamespace(), None, np.arange(2), np.full(2, np.inf), np.array([GREEN, CLEAR]), 1e-9
-    )
-    assert (found.rgba == [GREEN, CLEAR]).all()
-    assert (found.bound == 0).all()
 
 
 def test_bounds_are_what_met_tolerance_says():

@@ -26,7 +26,7 @@ from volref.io.atomic import atomic_path
 from volref.io.guard import wrapped
 from volref.io.npy import npz_headers, read_npz
 from volref.scene.blocks import MOST_KEPT, Pass, Ranges, keep_ranges
-from volref.scene.volume import Volume, in_memory_order
+from volref.scene.volume import Volume, in_memory_order, mapped_file
 
 # The environment variable that switches it off, and the words for that.
 SWITCH, OFF = "VOLREF_BLOCK_CACHE", ("0", "off", "no", "false")
@@ -59,7 +59,7 @@ def keep_beside(volume: Volume, file: Path) -> None:
     if volume.values.nbytes <= MOST_WITHOUT or os.environ.get(SWITCH, "").strip().lower() in OFF:
         return
     values = volume.values
-    data = _mapped_file(values)
+    data = mapped_file(values)
     if data is None:
         return
     try:
@@ -171,18 +171,6 @@ def _names(made: Pass) -> tuple[str, str]:
     """
     numbers = " ".join(map(str, (made.block, *made.reach)))
     return f"least {numbers}", f"greatest {numbers}"
-
-
-def _mapped_file(values: Numbers) -> Path | None:
-    """Return the file that an array is mapped from without gaps, or None."""
-    if not values.transpose(in_memory_order(values)).flags.c_contiguous:
-        return None
-    owner: object = values
-    while isinstance(owner, np.ndarray):
-        if isinstance(owner, np.memmap) and owner.filename is not None:
-            return Path(owner.filename)
-        owner = owner.base
-    return None
 
 
 def _key(data: Path, values: Numbers) -> str:

@@ -12,6 +12,7 @@ A GPU texture is "cell": texture coordinate u = (index + 1/2) / n, 0 at index -0
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -187,6 +188,18 @@ def in_memory_order(values: Numbers) -> tuple[int, int, int]:
     """
     first, second, third = np.argsort([-abs(stride) for stride in values.strides], kind="stable").tolist()
     return first, second, third
+
+
+def mapped_file(values: Numbers) -> Path | None:
+    """Return the file that an array is mapped from without gaps, or None."""
+    if not values.transpose(in_memory_order(values)).flags.c_contiguous:
+        return None
+    owner: object = values
+    while isinstance(owner, np.ndarray):
+        if isinstance(owner, np.memmap) and owner.filename is not None:
+            return Path(owner.filename)
+        owner = owner.base
+    return None
 
 
 def _parts(values: Numbers) -> Iterator[Numbers]:

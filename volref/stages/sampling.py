@@ -24,7 +24,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from volref.arrays import Floats, Indices, Numbers
-from volref.scene.volume import Volume
+from volref.scene.volume import Volume, in_memory_order, mapped_file
 from volref.workspace import Workspace
 
 PAD = 1  # layers added on each side
@@ -62,26 +62,14 @@ def grid_of(volume: Volume, dtype: np.typing.DTypeLike = np.float64) -> Grid:
     wanted: np.dtype[Any] = np.dtype(dtype)
     kept = _kept.setdefault(volume, {})
     if wanted not in kept:
-        if volume.values.size > MOST_COPIED and is_mapped(volume.values):
-            bare = bare_grid(volume)
-            if bare is not None:
-                return bare
+        if volume.values.size > MOST_COPIED and mapped_file(volume.values) is not None:
+            return bare_grid(volume)
         small = volume.values.size * wanted.itemsize <= MOST_KEPT
         grid = padded_grid(volume, wanted if small else None)
         if not small:
             return grid
         kept[wanted] = grid
     return kept[wanted]
-
-
-def is_mapped(values: Numbers) -> bool:
-    """Tell whether an array lies in a memory-mapped file."""
-    base: Any = values
-    while base is not None:
-        if isinstance(base, np.memmap):
-            return True
-        base = getattr(base, "base", None)
-    return False
 
 
 def padded_grid(volume: Volume, dtype: np.dtype[Any] | None = None) -> Grid:
@@ -96,13 +84,10 @@ def padded_grid(volume: Volume, dtype: np.dtype[Any] | None = None) -> Grid:
     return _grid(padded.reshape(-1), (padded.shape[1] * padded.shape[2], padded.shape[2], 1), None)
 
 
-def bare_grid(volume: Volume) -> Grid | None:
-    """Return a volume itself for gathering, or None where its samples do not lie one after the other."""
+def bare_grid(volume: Volume) -> Grid:
+    """Return a volume itself for gathering; its samples lie one after the other, in any order of the axes."""
     values = volume.values
-    flat = np.lib.stride_tricks.as_strided(values, (values.size,), (values.itemsize,), writeable=False)
-    order = sorted(range(3), key=lambda axis: -values.strides[axis])
-    if not values.transpose(order).flags.c_contiguous:
-        return None
+    flat = values.transpose(in_memory_order(values)).reshape(-1)
     z, y, x = (stride // values.itemsize for stride in values.strides)
     return _grid(flat, (z, y, x), (values.shape[2] - 1, values.shape[1] - 1, values.shape[0] - 1))
 
@@ -139,9 +124,6 @@ def trilinear(grid: Grid, position: Floats, work: Workspace, corner: Indices | N
         if grid.last is not None:
             _hold(fraction.reshape(-1, corner.shape[1]), grid.last[axis], corner[axis])
         np.copyto(whole, fraction, casting="unsafe")
-        if grid.last is not None:
-            most = max(grid.last[axis] - 1, 0) - corner[axis]
-            np.minimum(whole.reshape(-1, len(most)), most, out=whole.reshape(-1, len(most)), casting="unsafe")
         np.copyto(floor, whole)
         np.subtract(fraction, floor, out=fraction)
         stride = grid.strides[2 - axis]
@@ -165,7 +147,10 @@ def trilinear(grid: Grid, position: Floats, work: Workspace, corner: Indices | N
 
 
 def _hold(position: Floats, last: int, corner: Indices) -> None:
-    """Bring padded positions (S, b) to those of a bare grid, held to its outer samples, in place."""
+    """Bring padded positions (S, b) to those of a bare grid, held to its outer samples, in place.
+
+    On the last sample the fraction is 0, so that it does not matter which number is found beyond it.
+    """
     low, high = (np.asarray(end - corner, position.dtype) for end in (0, last))
     np.subtract(position, position.dtype.type(PAD), out=position)
     np.maximum(position, low, out=position)

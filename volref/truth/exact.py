@@ -102,15 +102,13 @@ def _steepest(volume: Volume) -> float:
 
 def integrate_pixels(
     scene: Scene,
-    prepared: Prepared | None,
+    prepared: Prepared,
     pixels: Indices,
     distance: Floats,
     behind: Floats,
     tolerance: float,
 ) -> "Integral":
     """Integrate along the rays of `pixels` (R,) to `distance` (R,), over what lies `behind` (R, 4)."""
-    if prepared is None:
-        return Integral(behind.copy(), np.zeros(len(pixels)), np.ones(len(pixels)), 0)
     rays = pixel_rays(scene.camera, scene.width, scene.height, pixels)
     origins = transform_points(prepared.index_from_world, rays.origins).T
     directions = transform_directions(prepared.index_from_world, rays.directions).T

@@ -1,6 +1,6 @@
 """The marcher: the emission-absorption integral by the midpoint rule at a uniform step.
 
-R rays of a chunk, S segments of a block, B blocks of a batch, c colour channels.
+R rays of a chunk, S segments of a block, c colour channels.
 
 With extinction sigma and colour c along a ray from t_near to t_far (Max 1995, eq. 5),
 
@@ -11,13 +11,13 @@ surface.  Each is taken as homogeneous with the value at its middle, which is of
 wherever sigma and c are continuous.  Taken three by three, the same samples are the midpoint rule at three
 times the step: the difference of both is the estimate of the error.
 
-Blocks of six segments in which nothing can be seen are left out before anything is sampled, and the rays are
-sorted by how many are left, so that at any time those that still have one come first:
+Blocks of six segments, or three where those are long, in which nothing can be seen are left out before
+anything is sampled, and the rays are sorted by how many are left, so that at any time those that still have
+one come first:
 
     ray 0   . . # # . # #            its blocks   2 3 5 6
     ray 1   # # # . . . .      ->                 0 1 2
     ray 2   . . . . # . .                         4
-                                    batches of      B B B B
 """
 
 import math
@@ -120,7 +120,7 @@ class _State:
 def march_chunk(
     scene: Scene,
     plan: Plan,
-    field: Field | None,
+    field: Field,
     pixels: Indices,
     distance: Floats,
     behind: Floats,
@@ -133,8 +133,6 @@ def march_chunk(
     rules, that difference is 8 times the error at second order and twice the error at first; a feature that
     both rules step over escapes it.
     """
-    if field is None:
-        return Chunk(behind.copy(), np.zeros(len(pixels)), 0)
     rays = pixel_rays(scene.camera, scene.width, scene.height, pixels)
     eyes = rays.origins if scene.camera.is_parallel else rays.origins[:1]
     origins = transform_points(field.index_from_world, eyes).T
