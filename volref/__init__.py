@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     )
     from volref.oracle.metrics import Comparison, compare
     from volref.planning import Plan, plan
-    from volref.scene import Camera, Mesh, Scene, TransferFunction, Volume
+    from volref.scene import Camera, Mesh, Scene, TransferFunction, TransferFunction2D, Volume
     from volref.truth.rendering import render
     from volref.truth.result import Render
     from volref.truth.tracing import Trace, trace
@@ -57,6 +57,7 @@ __all__ = [
     "SceneError",
     "Trace",
     "TransferFunction",
+    "TransferFunction2D",
     "Verification",
     "Volume",
     "compare",
@@ -86,7 +87,7 @@ _HOMES = {
     "volref.errors": ("FormatError", "SceneError"),
     "volref.oracle.metrics": ("Comparison", "compare"),
     "volref.planning": ("Plan", "plan"),
-    "volref.scene": ("Camera", "Mesh", "Scene", "TransferFunction", "Volume"),
+    "volref.scene": ("Camera", "Mesh", "Scene", "TransferFunction", "TransferFunction2D", "Volume"),
     "volref.truth.rendering": ("render",),
     "volref.truth.result": ("Render",),
     "volref.truth.tracing": ("Trace", "trace"),

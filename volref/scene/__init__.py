@@ -4,6 +4,7 @@ from volref.scene.camera import Camera
 from volref.scene.mesh import Mesh
 from volref.scene.scene import Scene
 from volref.scene.transfer import TransferFunction
+from volref.scene.transfer2d import TransferFunction2D
 from volref.scene.volume import Volume
 
-__all__ = ["Camera", "Mesh", "Scene", "TransferFunction", "Volume"]
+__all__ = ["Camera", "Mesh", "Scene", "TransferFunction", "TransferFunction2D", "Volume"]

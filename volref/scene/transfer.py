@@ -11,6 +11,9 @@ A lookup table of n texels over a domain from a to b has its entries at (texel-c
     a                       b
 
 so over 0..8 they lie at 1, 3, 5, 7; without texel centres, at a + (b - a) i / (n - 1): 0, 2.67, 5.33, 8.
+
+Gradient opacity is a second, piecewise linear factor in 0..1, of how steeply the field changes there: it
+multiplies what is interpolated, be it the extinction or the opacity of a unit distance.
 """
 
 import math
@@ -20,19 +23,19 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from volref.arrays import (
-    LARGEST_LENGTH,
-    LEAST_LENGTH,
-    Booleans,
-    Floats,
-    ShapeRule,
-    float_array,
-    number,
-    one_of,
-    plain_array,
-    set_fields,
-)
+from volref.arrays import Booleans, Floats, one_of, set_fields
 from volref.errors import SceneError
+from volref.scene.transfer_checks import (
+    GradientOpacity,
+    at_least_zero,
+    checked_domain,
+    checked_factors,
+    checked_length,
+    checked_positions,
+    checked_units,
+    share,
+    table_of_codes,
+)
 
 INTERPOLATIONS = ("extinction", "opacity")
 
@@ -55,6 +58,12 @@ class TransferFunction:
         extinction = -log1p(-opacity) / unit_distance; an opacity of 1 ends a ray.
     unit_distance
         The world length for which `opacity` is meant.
+    gradient_opacity
+        Magnitudes (G,) of the gradient, non-decreasing, in value units per world unit, and factors (G,) in
+        0..1 of the extinction or opacity, whichever is interpolated; linear between, held beyond the ends.
+        Two equal magnitudes are a jump.  None is 1 everywhere.
+    units
+        Unit of the values, for people: "HU", "dBZ".
 
     Raises
     ------
@@ -73,6 +82,8 @@ class TransferFunction:
     extinction: Floats | None
     opacity: Floats | None
     unit_distance: float
+    gradient_opacity: tuple[Floats, Floats] | None
+    units: str
 
     def __init__(
         self,
@@ -81,22 +92,27 @@ class TransferFunction:
         extinction: ArrayLike | None = None,
         opacity: ArrayLike | None = None,
         unit_distance: float = 1.0,
+        *,
+        gradient_opacity: GradientOpacity | None = None,
+        units: str = "",
     ) -> None:
         if (extinction is None) == (opacity is None):
             given = "neither" if extinction is None else "both"
             message = f"transfer must have one of extinction and opacity, got {given}; "
             raise SceneError(message + "give the one that is linear between the knots")
-        knots = _checked_positions(values)
+        knots = checked_positions("transfer.values", values)
         count = (len(knots),)
         set_fields(
             self,
             values=knots,
-            colors=_at_least_zero("transfer.colors", colors, (*count, 3)),
+            colors=at_least_zero("transfer.colors", colors, (*count, 3)),
             extinction=None
             if extinction is None
-            else _at_least_zero("transfer.extinction", extinction, count),
-            opacity=None if opacity is None else _checked_opacity(opacity, count),
-            unit_distance=_checked_length(unit_distance),
+            else at_least_zero("transfer.extinction", extinction, count),
+            opacity=None if opacity is None else share("transfer.opacity", opacity, count),
+            unit_distance=checked_length(unit_distance),
+            gradient_opacity=None if gradient_opacity is None else checked_factors(gradient_opacity),
+            units=checked_units(units),
         )
 
     @classmethod
@@ -108,6 +124,8 @@ class TransferFunction:
         unit_distance: float = 1.0,
         *,
         interpolation: str = "opacity",
+        gradient_opacity: GradientOpacity | None = None,
+        units: str = "",
     ) -> Self:
         """Transfer function of opacities, as GPU tables hold them.
 
@@ -122,16 +140,19 @@ class TransferFunction:
         [0.0, 1.0]
         """
         one_of("interpolation", interpolation, INTERPOLATIONS)
-        if interpolation == "opacity":
-            return cls(values, colors, opacity=opacity, unit_distance=unit_distance)
-        alpha = _checked_opacity(opacity, ("K",))
-        if (alpha == 1).any():
-            message = "transfer.opacity must stay below 1 where extinction is interpolated, got 1 at index "
-            message += f"{int(np.argmax(alpha == 1))}; lower it or use interpolation='opacity'"
-            raise SceneError(message)
-        length = _checked_length(unit_distance)
-        extinction = -np.log1p(-alpha) / length
-        return cls(values, colors, extinction, unit_distance=length)
+        extinction = None
+        if interpolation == "extinction":
+            length = checked_length(unit_distance)
+            extinction, opacity = _extinction_of(share("transfer.opacity", opacity, ("K",)), length), None
+        return cls(
+            values,
+            colors,
+            extinction,
+            opacity,
+            unit_distance,
+            gradient_opacity=gradient_opacity,
+            units=units,
+        )
 
     @classmethod
     def from_lut(
@@ -142,6 +163,8 @@ class TransferFunction:
         *,
         texel_centers: bool = True,
         interpolation: str = "opacity",
+        gradient_opacity: GradientOpacity | None = None,
+        units: str = "",
     ) -> Self:
         """Transfer function of a lookup table (n, 4) with straight colours, spread over `domain`.
 
@@ -155,22 +178,23 @@ class TransferFunction:
         >>> TransferFunction.from_lut(table, (0, 8)).values.tolist()
         [1.0, 3.0, 5.0, 7.0]
         """
-        table = plain_array("transfer.rgba", rgba)
-        if table.dtype.kind in "iu":
-            table = table / np.iinfo(table.dtype).max
-        table = float_array("transfer.rgba", table, ("n", 4))
-        ends = float_array("transfer.domain", domain, (2,))
-        if not ends[0] < ends[1]:
-            message = f"transfer.domain must rise, got {ends.tolist()}; swap or move its ends"
-            raise SceneError(message)
+        table = table_of_codes(rgba, ("n", 4))
+        first, last = checked_domain("transfer.domain", domain)
         count = len(table)
         if count < (1 if texel_centers else 2):
             message = f"transfer.rgba must have more entries, got {count}; give at least 2"
             raise SceneError(message)
         index = np.arange(count)
         place = (index + 0.5) / count if texel_centers else index / (count - 1)
-        values = ends[0] + (ends[1] - ends[0]) * place
-        return cls.from_opacity(values, table[:, :3], table[:, 3], unit_distance, interpolation=interpolation)
+        return cls.from_opacity(
+            first + (last - first) * place,
+            table[:, :3],
+            table[:, 3],
+            unit_distance,
+            interpolation=interpolation,
+            gradient_opacity=gradient_opacity,
+            units=units,
+        )
 
     @property
     def interpolation(self) -> str:
@@ -222,43 +246,9 @@ class TransferFunction:
         return np.asarray(seen_knot_inside | seen_from_below | seen_from_above)
 
 
-def _checked_length(unit_distance: float) -> float:
-    length = number("transfer.unit_distance", unit_distance, above=0, high=LARGEST_LENGTH)
-    return number("transfer.unit_distance", length, low=LEAST_LENGTH)
-
-
-def _checked_positions(values: ArrayLike) -> Floats:
-    array = float_array("transfer.values", values, ("K",))
-    if len(array) == 0:
-        message = "transfer.values must have at least one knot, got none; give one"
+def _extinction_of(opacity: Floats, unit_distance: float) -> Floats:
+    if (opacity == 1).any():
+        message = "transfer.opacity must stay below 1 where extinction is interpolated, got 1 at index "
+        message += f"{int(np.argmax(opacity == 1))}; lower it or use interpolation='opacity'"
         raise SceneError(message)
-    falls = np.flatnonzero(np.diff(array) < 0)
-    if len(falls):
-        i = int(falls[0]) + 1
-        message = f"transfer.values must not decrease, got {array[i]:g} after {array[i - 1]:g} at index {i}; "
-        raise SceneError(message + "sort the table")
-    triples = np.flatnonzero(array[2:] == array[:-2])
-    if len(triples):
-        i = int(triples[0])
-        message = f"transfer.values must hold a value at most twice, got {array[i]:g} at indices "
-        raise SceneError(message + f"{i} to {i + 2}; keep the first and the last")
-    return array
-
-
-def _at_least_zero(name: str, value: ArrayLike, shape: ShapeRule) -> Floats:
-    array = float_array(name, value, shape)
-    if (array < 0).any():
-        where = tuple(int(i) for i in np.argwhere(array < 0)[0])
-        index = where[0] if len(where) == 1 else where
-        message = f"{name} must be at least 0, got {array[where]:g} at index {index}; "
-        raise SceneError(message + "raise it to 0")
-    return array
-
-
-def _checked_opacity(opacity: ArrayLike, shape: ShapeRule) -> Floats:
-    array = _at_least_zero("transfer.opacity", opacity, shape)
-    if (array > 1).any():
-        i = int(np.argmax(array > 1))
-        message = f"transfer.opacity must lie in 0..1, got {array[i]:g} at index {i}; "
-        raise SceneError(message + "divide by the largest code, or give extinction instead")
-    return array
+    return np.asarray(-np.log1p(-opacity) / unit_distance)
