@@ -37,7 +37,18 @@ if TYPE_CHECKING:
     )
     from volref.oracle.metrics import Comparison, compare
     from volref.planning import Plan, plan
-    from volref.scene import Camera, Mesh, Scene, TransferFunction, TransferFunction2D, Volume
+    from volref.scene import (
+        Camera,
+        Light,
+        Material,
+        Mesh,
+        Plane,
+        Scene,
+        TransferFunction,
+        TransferFunction2D,
+        Volume,
+        clip_box,
+    )
     from volref.truth.rendering import render
     from volref.truth.result import Render
     from volref.truth.tracing import Trace, trace
@@ -50,8 +61,11 @@ __all__ = [
     "Camera",
     "Comparison",
     "FormatError",
+    "Light",
+    "Material",
     "Mesh",
     "Plan",
+    "Plane",
     "Render",
     "Scene",
     "SceneError",
@@ -60,6 +74,7 @@ __all__ = [
     "TransferFunction2D",
     "Verification",
     "Volume",
+    "clip_box",
     "compare",
     "convert_volume",
     "describe_file",
@@ -87,7 +102,18 @@ _HOMES = {
     "volref.errors": ("FormatError", "SceneError"),
     "volref.oracle.metrics": ("Comparison", "compare"),
     "volref.planning": ("Plan", "plan"),
-    "volref.scene": ("Camera", "Mesh", "Scene", "TransferFunction", "TransferFunction2D", "Volume"),
+    "volref.scene": (
+        "Camera",
+        "Light",
+        "Material",
+        "Mesh",
+        "Plane",
+        "Scene",
+        "TransferFunction",
+        "TransferFunction2D",
+        "Volume",
+        "clip_box",
+    ),
     "volref.truth.rendering": ("render",),
     "volref.truth.result": ("Render",),
     "volref.truth.tracing": ("Trace", "trace"),

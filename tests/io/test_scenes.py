@@ -57,7 +57,7 @@ def scenes(draw):
     volume = draw(volumes()) if not meshes or draw(st.booleans()) else None
     transfer = None if volume is None else draw(transfers())
     alpha = draw(st.floats(0.1, 1))
-    return Scene(volume, transfer, draw(cameras()), 8, 6, meshes, (alpha / 3, 0.5, 2.0, alpha))
+    return Scene(volume, transfer, draw(cameras()), 8, 6, meshes, background=(alpha / 3, 0.5, 2.0, alpha))
 
 
 def assert_same_fields(one, other, names):

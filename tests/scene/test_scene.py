@@ -49,3 +49,17 @@ def test_meshes_are_a_list():
     scene = rough_scene()
     with pytest.raises(SceneError, match=r"scene.meshes must be a list of meshes, got NoneType"):
         dataclasses.replace(scene, meshes=None)
+
+
+def test_modes_take_what_they_need_and_nothing_else():
+    scene = rough_scene()
+    with pytest.raises(SceneError, match=r"scene.isovalue must be given in mode 'isosurface'.*got none"):
+        dataclasses.replace(scene, mode="isosurface")
+    with pytest.raises(SceneError, match=r"scene.isovalue must be given.*got one in mode 'mip'"):
+        dataclasses.replace(scene, mode="mip", isovalue=1.0)
+    with pytest.raises(SceneError, match=r"scene.slice_plane must be given in mode 'slice'"):
+        dataclasses.replace(scene, mode="slice")
+    with pytest.raises(SceneError, match=r"scene.mode must be 'composite' or"):
+        dataclasses.replace(scene, mode="sum")
+    with pytest.raises(SceneError, match=r"scene.lights\[0\] must be a volref.Light, got tuple"):
+        dataclasses.replace(scene, lights=[(1, 1, 1)])

@@ -71,7 +71,7 @@ def load_scene(path: str | Path, *, allow_outside: bool = False, max_bytes: int 
         document["width"],
         document["height"],
         meshes,
-        document.get("background", (0.0, 0.0, 0.0, 0.0)),
+        background=document.get("background", (0.0, 0.0, 0.0, 0.0)),
     )
 
 

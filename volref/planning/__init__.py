@@ -92,6 +92,7 @@ def plan(
     if not isinstance(scene, Scene):
         message = f"scene must be a volref.Scene, got {type(scene).__name__}; build or load one first"
         raise SceneError(message)
+    _refuse_what_is_not_built(scene)
     one_of("method", method, METHODS)
     number("tolerance", tolerance, above=0)
     if method == "auto" and certified:
@@ -137,6 +138,15 @@ def plan(
         rounding,
         block,
     )
+
+
+def _refuse_what_is_not_built(scene: Scene) -> None:
+    """Refuse what a scene can say and no integrator does yet: an image without it would be wrong."""
+    plain = {"lights": (), "mode": "composite", "clip": (), "classification": "post"}
+    for name, value in plain.items():
+        if getattr(scene, name) != value:
+            message = f"scene.{name} must be {value!r} in this version, got another; render it without"
+            raise SceneError(message)
 
 
 def _stepless(scene: Scene, method: str, tolerance: float) -> Plan:

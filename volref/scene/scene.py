@@ -7,21 +7,28 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from volref.arrays import Floats, float_array, set_fields, whole_number
+from volref.arrays import Floats, float_array, number, one_of, set_fields, whole_number
 from volref.errors import SceneError
 from volref.scene.camera import Camera
+from volref.scene.lights import Light, Material
 from volref.scene.mesh import Mesh
+from volref.scene.plane import Plane
 from volref.scene.transfer import TransferFunction
 from volref.scene.volume import Volume
 
 LARGEST_IMAGE_SIDE = 65536
+
+# What becomes of the values along a ray.
+MODES = ("composite", "mip", "minip", "average", "isosurface", "slice")
+GRADIENTS = ("central", "sobel", "analytic")
+CLASSIFICATIONS = ("post", "pre", "per-slice")
 
 RGBA: TypeAlias = tuple[float, float, float, float]
 
 
 @dataclass(frozen=True, eq=False, init=False)
 class Scene:
-    """One volume with its transfer function, opaque meshes, a camera and an image size.
+    """One volume with its transfer function, meshes, lights, a camera and an image size.
 
     Parameters
     ----------
@@ -32,9 +39,29 @@ class Scene:
     width, height
         Size of the image in pixels.
     meshes
-        Opaque surfaces; they end the volume integral where the ray meets them.
+        Surfaces; opaque ones end the volume integral where the ray meets them.
+    lights
+        Without any, the volume's colours are emitted as they are.  Meshes answer them if they are `lit`.
+    material
+        How the volume and lit meshes answer lights; default `Material()`.
     background
         Premultiplied RGBA that lies behind everything.
+    mode
+        "composite": emission and absorption along the ray.  "mip", "minip" and "average": the greatest, least
+        or mean value along the ray, then classified as a layer one unit distance thick.  "isosurface": an
+        opaque surface where the ray first meets `isovalue`, in the colour that the transfer function has
+        there.  "slice": the value where the ray meets `slice_plane`, classified as "mip" does.
+    isovalue, slice_plane
+        Of these two modes.
+    clip
+        Planes; what lies behind any of them is cut away, of the volume and of the meshes.
+    gradient
+        How the gradient is taken: "central" differences or the 3 x 3 x 3 "sobel" operator at the samples,
+        interpolated between them, or the "analytic" gradient of the interpolated field, which jumps from cell
+        to cell.  It is per world unit.
+    classification
+        "post": values are interpolated, then looked up.  "pre": samples are looked up, then interpolated.
+        "per-slice": values are interpolated in the slices before and behind, looked up, then interpolated.
 
     Raises
     ------
@@ -48,7 +75,15 @@ class Scene:
     width: int
     height: int
     meshes: tuple[Mesh, ...]
+    lights: tuple[Light, ...]
+    material: Material | None
     background: RGBA
+    mode: str
+    isovalue: float | None
+    slice_plane: Plane | None
+    clip: tuple[Plane, ...]
+    gradient: str
+    classification: str
 
     def __init__(
         self,
@@ -58,16 +93,24 @@ class Scene:
         width: int,
         height: int,
         meshes: Sequence[Mesh] = (),
+        lights: Sequence[Light] = (),
+        material: Material | None = None,
         background: ArrayLike = (0.0, 0.0, 0.0, 0.0),
+        mode: str = "composite",
+        *,
+        isovalue: float | None = None,
+        slice_plane: Plane | None = None,
+        clip: Sequence[Plane] = (),
+        gradient: str = "central",
+        classification: str = "post",
     ) -> None:
         _check_type("scene.volume", volume, Volume, optional=True)
         _check_type("scene.transfer", transfer, TransferFunction, optional=True)
         _check_type("scene.camera", camera, Camera)
-        if not isinstance(meshes, Sequence):
-            message = f"scene.meshes must be a list of meshes, got {type(meshes).__name__}; give [mesh] or ()"
-            raise SceneError(message)
-        for i, mesh in enumerate(meshes):
-            _check_type(f"scene.meshes[{i}]", mesh, Mesh)
+        _check_type("scene.material", material, Material, optional=True)
+        _check_type("scene.slice_plane", slice_plane, Plane, optional=True)
+        for name, items, kind in (("meshes", meshes, Mesh), ("lights", lights, Light), ("clip", clip, Plane)):
+            _check_list(f"scene.{name}", items, kind)
         if (volume is None) != (transfer is None):
             missing = "volume" if volume is None else "transfer"
             message = f"scene.{missing} must be given with the other one, got None; "
@@ -75,6 +118,9 @@ class Scene:
         if volume is None and not meshes:
             message = "scene must show a volume or a mesh, got neither; give one"
             raise SceneError(message)
+        one_of("scene.mode", mode, MODES)
+        _check_needed("scene.isovalue", isovalue, mode, "isosurface")
+        _check_needed("scene.slice_plane", slice_plane, mode, "slice")
         set_fields(
             self,
             volume=volume,
@@ -83,7 +129,15 @@ class Scene:
             width=whole_number("scene.width", width, low=1, high=LARGEST_IMAGE_SIDE),
             height=whole_number("scene.height", height, low=1, high=LARGEST_IMAGE_SIDE),
             meshes=tuple(meshes),
+            lights=tuple(lights),
+            material=material,
             background=tuple(_checked_background(background).tolist()),
+            mode=mode,
+            isovalue=None if isovalue is None else number("scene.isovalue", isovalue),
+            slice_plane=slice_plane,
+            clip=tuple(clip),
+            gradient=one_of("scene.gradient", gradient, GRADIENTS),
+            classification=one_of("scene.classification", classification, CLASSIFICATIONS),
         )
         camera.check_aspect(self.width, self.height)
 
@@ -92,6 +146,24 @@ def _check_type(name: str, value: object, kind: type, *, optional: bool = False)
     if isinstance(value, kind) or (optional and value is None):
         return
     message = f"{name} must be a volref.{kind.__name__}, got {type(value).__name__}; build one first"
+    raise SceneError(message)
+
+
+def _check_list(name: str, items: object, kind: type) -> None:
+    if not isinstance(items, Sequence):
+        word = kind.__name__.lower()
+        message = f"{name} must be a list of {word}{'e' * word.endswith('sh')}s, got {type(items).__name__}; "
+        raise SceneError(message + f"give [{word}] or ()")
+    for i, item in enumerate(items):
+        _check_type(f"{name}[{i}]", item, kind)
+
+
+def _check_needed(name: str, value: object, mode: str, needed: str) -> None:
+    """Refuse what the mode needs and has not, or has and does not need."""
+    if (value is None) == (mode != needed):
+        return
+    got = "none" if value is None else f"one in mode {mode!r}"
+    message = f"{name} must be given in mode {needed!r} and in no other, got {got}; give it with that mode"
     raise SceneError(message)
 
 

@@ -37,11 +37,15 @@ def errand_of(integration: Integration, folder: Folder) -> Errand:
     scene, plan = integration.scene, integration.plan
     assert scene.volume is not None
     # Meshes stay: where they end the rays, and what colour they have, goes with each task.
-    view = scene.transfer, scene.camera, scene.width, scene.height, scene.background
+    view = {
+        name.name: getattr(scene, name.name)
+        for name in dataclasses.fields(scene)
+        if name.name not in ("volume", "meshes")
+    }
     decided = {
         field.name: getattr(plan, field.name) for field in dataclasses.fields(plan) if field.name != "scene"
     }
-    message = pack((*view, decided), folder)
+    message = pack((view, decided), folder)
     return Errand(_versions(), refer_to_volume(scene.volume, folder), message)
 
 
@@ -92,8 +96,8 @@ def _integration(errand: Errand) -> Integration:
 
 @lru_cache(maxsize=2)
 def _made_ready(errand: Errand) -> Integration:
-    transfer, camera, width, height, background, decided = unpack(errand.rest)
-    scene = Scene(fetch_volume(errand.volume), transfer, camera, width, height, (), background)
+    view, decided = unpack(errand.rest)
+    scene = Scene(fetch_volume(errand.volume), **view)
     integration = Integration(scene, Plan(scene=scene, **decided))
     integration.make_ready()
     return integration
