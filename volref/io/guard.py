@@ -179,14 +179,24 @@ def read_json(path: Path) -> object:
     file = existing_file(path)
     check_memory(file, file.stat().st_size, LARGEST_JSON_BYTES, "JSON text")
     with wrapped(file, "JSON document", "mend it at that place"):
-        text = file.read_text(encoding="utf-8")
-        return json.loads(
-            text,
-            parse_constant=_refuse_constant,
-            parse_float=_finite_float,
-            parse_int=_bounded_int,
-            object_pairs_hook=_once,
-        )
+        return parse_json(file.read_text(encoding="utf-8"))
+
+
+def parse_json(text: str) -> object:
+    """Return the document in a JSON text, by the rules of `read_json`.
+
+    Raises
+    ------
+    ValueError
+        If the text is none; `wrapped` makes a FormatError of it.
+    """
+    return json.loads(
+        text,
+        parse_constant=_refuse_constant,
+        parse_float=_finite_float,
+        parse_int=_bounded_int,
+        object_pairs_hook=_once,
+    )
 
 
 def nearest(word: str, known: Iterable[str]) -> str:
