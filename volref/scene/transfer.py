@@ -25,6 +25,7 @@ from numpy.typing import ArrayLike
 
 from volref.arrays import Booleans, Floats, one_of, set_fields
 from volref.errors import SceneError
+from volref.scene.spline import spline_table
 from volref.scene.transfer_checks import (
     GradientOpacity,
     at_least_zero,
@@ -142,13 +143,14 @@ class TransferFunction:
         one_of("interpolation", interpolation, INTERPOLATIONS)
         extinction = None
         if interpolation == "extinction":
-            length = checked_length(unit_distance)
-            extinction, opacity = _extinction_of(share("transfer.opacity", opacity, ("K",)), length), None
+            extinction = _extinction_of(
+                share("transfer.opacity", opacity, ("K",)), checked_length(unit_distance)
+            )
         return cls(
             values,
             colors,
             extinction,
-            opacity,
+            opacity if extinction is None else None,
             unit_distance,
             gradient_opacity=gradient_opacity,
             units=units,
@@ -191,6 +193,48 @@ class TransferFunction:
             table[:, :3],
             table[:, 3],
             unit_distance,
+            interpolation=interpolation,
+            gradient_opacity=gradient_opacity,
+            units=units,
+        )
+
+    @classmethod
+    def from_spline(
+        cls,
+        values: ArrayLike,
+        colors: ArrayLike,
+        opacity: ArrayLike,
+        unit_distance: float = 1.0,
+        *,
+        samples: int = 256,
+        kind: str = "natural",
+        texel_centers: bool = True,
+        interpolation: str = "opacity",
+        gradient_opacity: GradientOpacity | None = None,
+        units: str = "",
+    ) -> Self:
+        """Transfer function of a cubic spline through control points, baked to a table of `samples` entries.
+
+        The table spreads over the values from the first control point to the last, its entries placed as in
+        `from_lut`, and is linear between them: what a program draws that uploads the spline as a texture.
+        Colours (K, 3) and opacities (K,) of the control points lie in 0..1, and the spline is held to that.
+
+        `kind` is "natural", "clamped" (slope 0 at the ends), "not-a-knot", "catmull-rom", or "monotone"
+        (PCHIP), which alone never swings beyond the control points.
+
+        Examples
+        --------
+        >>> colors = [(0, 0, 0), (0.5, 0.5, 0.5), (1, 1, 1)]
+        >>> spline = TransferFunction.from_spline([0, 1, 2], colors, [0, 0.8, 0], samples=4)
+        >>> spline.values.tolist(), spline.opacity.round(4).tolist()
+        ([0.25, 0.75, 1.25, 1.75], [0.2938, 0.7312, 0.7312, 0.2938])
+        """
+        table, domain = spline_table(values, colors, opacity, samples, kind, texel_centers=texel_centers)
+        return cls.from_lut(
+            table,
+            domain,
+            unit_distance,
+            texel_centers=texel_centers,
             interpolation=interpolation,
             gradient_opacity=gradient_opacity,
             units=units,

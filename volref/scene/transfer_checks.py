@@ -89,7 +89,8 @@ def share(name: str, value: ArrayLike | None, shape: ShapeRule) -> Floats:
     """Return numbers in 0..1."""
     array = at_least_zero(name, [] if value is None else value, shape)
     if (array > 1).any():
-        i = int(np.argmax(array > 1))
-        message = f"{name} must lie in 0..1, got {array[i]:g} at index {i}; "
+        where = tuple(int(i) for i in np.argwhere(array > 1)[0])
+        index = where[0] if len(where) == 1 else where
+        message = f"{name} must lie in 0..1, got {array[where]:g} at index {index}; "
         raise SceneError(message + "divide by the largest code, or give extinction instead")
     return array
