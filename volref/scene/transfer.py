@@ -226,8 +226,8 @@ class TransferFunction:
         --------
         >>> colors = [(0, 0, 0), (0.5, 0.5, 0.5), (1, 1, 1)]
         >>> spline = TransferFunction.from_spline([0, 1, 2], colors, [0, 0.8, 0], samples=4)
-        >>> spline.values.tolist(), spline.opacity.round(4).tolist()
-        ([0.25, 0.75, 1.25, 1.75], [0.2938, 0.7312, 0.7312, 0.2938])
+        >>> spline.values.tolist(), spline.opacity.round(6).tolist()
+        ([0.25, 0.75, 1.25, 1.75], [0.29375, 0.73125, 0.73125, 0.29375])
         """
         table, domain = spline_table(values, colors, opacity, samples, kind, texel_centers=texel_centers)
         return cls.from_lut(
