@@ -4,6 +4,7 @@ from volref.scene.camera import Camera
 from volref.scene.lights import Light, Material
 from volref.scene.mesh import Mesh
 from volref.scene.plane import Plane, clip_box
+from volref.scene.radar import RadarVolume, Sweep
 from volref.scene.scene import Scene
 from volref.scene.transfer import TransferFunction
 from volref.scene.transfer2d import TransferFunction2D
@@ -15,7 +16,9 @@ __all__ = [
     "Material",
     "Mesh",
     "Plane",
+    "RadarVolume",
     "Scene",
+    "Sweep",
     "TransferFunction",
     "TransferFunction2D",
     "Volume",
