@@ -61,3 +61,43 @@ def test_a_texture_of_bytes_is_divided_by_255_and_never_decoded():
 def test_ragged_rows_are_refused_in_one_sentence(faces, more):
     with pytest.raises(SceneError, match="must be an array, got rows of different lengths"):
         Mesh(QUAD, faces, **more)
+
+
+def test_a_mesh_is_transparent_if_its_opacity_or_any_alpha_is_below_one():
+    uv = [(0, 0), (1, 0), (1, 1), (0, 1)]
+    assert not Mesh(QUAD, HALVES).transparent
+    assert not Mesh(QUAD, HALVES, (1, 0, 0, 1)).transparent
+    assert Mesh(QUAD, HALVES, opacity=0.5).transparent
+    assert Mesh(QUAD, HALVES, (1, 0, 0, 0.5)).transparent
+    assert Mesh(QUAD, HALVES, np.full((4, 4), 0.5)).transparent
+    codes = np.full((2, 2, 4), 255, np.uint8)
+    assert not Mesh(QUAD, HALVES, uv=uv, texture=codes).transparent
+    codes[0, 0, 3] = 254
+    assert Mesh(QUAD, HALVES, uv=uv, texture=codes).transparent
+
+
+def test_normals_of_vertices_that_no_triangle_uses_do_not_matter():
+    normals = np.zeros((5, 3))
+    normals[:4, 2] = 7
+    mesh = Mesh([*QUAD, (9, 9, 9)], HALVES, lit=True, normals=normals)
+    assert mesh.normals.tolist() == normals.tolist()
+
+
+@pytest.mark.parametrize(
+    ("options", "sentence"),
+    [
+        ({"opacity": 0}, "mesh.opacity must be above 0, got 0"),
+        ({"opacity": 1.5}, "mesh.opacity must be at most 1, got 1.5"),
+        ({"opacity": np.nan}, "mesh.opacity must be finite"),
+        ({"colors": (1, 0, 0, 255)}, "mesh.colors must have alphas of at most 1, got 255"),
+        ({"colors": (1, 0, -1, 0)}, "mesh.colors must be at least 0, got -1"),
+        ({"normals": np.ones((3, 3))}, r"mesh.normals must have shape \(4, 3\)"),
+        ({"normals": [(0, 0, 1), (0, 0, 0), (0, 0, 1), (0, 0, 1)]}, "must not be 0, got .* at vertex 1"),
+        ({"sides": "outer"}, "mesh.sides must be 'both' or 'front' or 'back', got 'outer'"),
+        ({"back_color": (1, 0, 0, 1)}, r"mesh.back_color must have shape \(3\)"),
+        ({"back_color": (1, -1, 0)}, "mesh.back_color must be at least 0, got -1"),
+    ],
+)
+def test_what_a_mesh_cannot_be_is_refused_in_one_sentence(options, sentence):
+    with pytest.raises(SceneError, match=sentence):
+        Mesh(QUAD, HALVES, **options)
