@@ -21,6 +21,7 @@ if TYPE_CHECKING:
         AtlasLayout,
         convert_volume,
         describe_file,
+        load_camera,
         load_mesh,
         load_meshes,
         load_raw,
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
         load_transfer,
         load_volume,
         read_image,
+        save_camera,
         save_mesh,
         save_scene,
         save_transfer,
@@ -51,6 +53,7 @@ if TYPE_CHECKING:
         Volume,
         clip_box,
     )
+    from volref.scene.arcball import arcball_rotation, drag
     from volref.truth.rendering import render
     from volref.truth.result import Render
     from volref.truth.tracing import Trace, trace
@@ -78,10 +81,13 @@ __all__ = [
     "TransferFunction2D",
     "Verification",
     "Volume",
+    "arcball_rotation",
     "clip_box",
     "compare",
     "convert_volume",
     "describe_file",
+    "drag",
+    "load_camera",
     "load_mesh",
     "load_meshes",
     "load_raw",
@@ -91,6 +97,7 @@ __all__ = [
     "plan",
     "read_image",
     "render",
+    "save_camera",
     "save_mesh",
     "save_scene",
     "save_transfer",
@@ -120,6 +127,7 @@ _HOMES = {
         "Volume",
         "clip_box",
     ),
+    "volref.scene.arcball": ("arcball_rotation", "drag"),
     "volref.truth.rendering": ("render",),
     "volref.truth.result": ("Render",),
     "volref.truth.tracing": ("Trace", "trace"),

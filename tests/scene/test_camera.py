@@ -1,5 +1,7 @@
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from volref import Camera, SceneError
 from volref.scene.camera import look_at_matrix
@@ -83,3 +85,52 @@ def test_numbers_too_large_for_a_length_are_refused_in_a_short_sentence(number):
     assert len(str(refusal.value)) < 200
     with pytest.raises(SceneError, match=r"camera\.near must be"):
         Camera.look_at((5, 0, 0), (0, 0, 0), (0, 0, 1), 40.0, 10**400, 20.0)
+
+
+ARCBALL = {"target": (1.0, -2.0, 3.0), "distance": 5.0, "fov_y": 30.0, "near": 0.5, "far": 20.0}
+
+
+def test_the_identity_of_an_arcball_looks_along_minus_z_with_y_upwards():
+    camera = Camera.arcball((0, 0, 0, 1), **ARCBALL)
+    same = Camera.look_at((1, -2, 8), (1, -2, 3), (0, 1, 0), 30.0, 0.5, 20.0)
+    assert np.array_equal(camera.view_from_world, same.view_from_world)
+    assert (camera.kind, camera.fov_y, camera.near, camera.far) == ("perspective", 30.0, 0.5, 20.0)
+
+
+@given(st.lists(st.floats(-2, 2), min_size=4, max_size=4).filter(lambda q: np.linalg.norm(q) > 1e-3))
+def test_the_quaternion_of_an_arcball_turns_the_world_as_hamilton_has_it(quaternion):
+    """v' = q v q*, by the components of Hamilton's product, then the camera's distance along -z."""
+
+    def product(a, b):
+        (ax, ay, az, aw), (bx, by, bz, bw) = a, b
+        return (
+            aw * bx + ax * bw + ay * bz - az * by,
+            aw * by - ax * bz + ay * bw + az * bx,
+            aw * bz + ax * by - ay * bx + az * bw,
+            aw * bw - ax * bx - ay * by - az * bz,
+        )
+
+    camera = Camera.arcball(quaternion, **ARCBALL)
+    unit = np.array(quaternion) / np.linalg.norm(quaternion)
+    world = np.array([0.3, 1.7, -2.2])
+    away = (*(world - ARCBALL["target"]), 0.0)
+    turned = product(product(unit, away), unit * [-1, -1, -1, 1])
+    # Some 20 operations on numbers below 10, each off by half an ulp.
+    np.testing.assert_allclose(
+        camera.view_from_world @ [*world, 1], np.array([*turned[:3], 1]) - [0, 0, 5, 0], rtol=0, atol=2e-14
+    )
+
+
+@pytest.mark.parametrize(
+    ("change", "fragment"),
+    [
+        ({"quaternion": (0, 0, 0, 0)}, "camera.quaternion must not be zero"),
+        ({"quaternion": (0, 0, 1)}, "camera.quaternion must have shape (4)"),
+        ({"distance": 0.0}, "camera.distance must be above 0"),
+        ({"target": (0, 0, np.inf)}, "camera.target must be finite"),
+    ],
+)
+def test_what_is_no_arcball_is_refused(change, fragment):
+    with pytest.raises(SceneError) as refusal:
+        Camera.arcball(**({"quaternion": (0, 0, 0, 1)} | ARCBALL | change))
+    assert fragment in str(refusal.value)

@@ -2,6 +2,7 @@
 
 from volref.io.atlas import AtlasLayout
 from volref.io.atomic import atomic_path
+from volref.io.cameras import load_camera, save_camera
 from volref.io.convert import convert_volume, save_volume
 from volref.io.documents import scene_schema
 from volref.io.images import read_image, write_image
@@ -18,6 +19,7 @@ __all__ = [
     "atomic_path",
     "convert_volume",
     "describe_file",
+    "load_camera",
     "load_mesh",
     "load_meshes",
     "load_raw",
@@ -25,6 +27,7 @@ __all__ = [
     "load_transfer",
     "load_volume",
     "read_image",
+    "save_camera",
     "save_mesh",
     "save_scene",
     "save_transfer",

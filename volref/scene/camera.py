@@ -28,7 +28,10 @@ CLIP_RANGES = ("-1..1", "0..1")
 
 @dataclass(frozen=True, eq=False, init=False)
 class Camera:
-    """A pinhole or a parallel projection; build one with `look_at`, `orthographic` or `from_matrices`.
+    """A pinhole or a parallel projection.
+
+    Build one with `look_at`, `arcball`, `orthographic` or `from_matrices`, or read it with
+    `volref.load_camera`.
 
     Parameters
     ----------
@@ -115,6 +118,40 @@ class Camera:
         [0.0, 0.0, -5.0]
         """
         view = look_at_matrix(eye, target, up)
+        return cls(view, "perspective", fov_y=fov_y, near=near, far=far, clip_z=clip_z)
+
+    @classmethod
+    def arcball(
+        cls,
+        quaternion: ArrayLike,
+        *,
+        target: ArrayLike,
+        distance: float,
+        fov_y: float,
+        near: float,
+        far: float,
+        clip_z: str = "-1..1",
+    ) -> Self:
+        """Perspective camera `distance` away from `target`, which `quaternion` (x, y, z, w) has turned.
+
+        The quaternion turns the world in front of a camera that looks along -z with y upwards, so
+        `view_from_world` is T(0, 0, -distance) R(quaternion) T(-target), as a program has it that lets its
+        user turn the object.  The camera itself is turned by the conjugate (-x, -y, -z, w).  A length other
+        than 1 is divided out.  `volref.arcball_rotation` gives the quaternion of a drag; after it comes
+        the one of before: Rotation(drag) * Rotation(before).
+
+        Examples
+        --------
+        The world is turned by 90 degrees about y, so what was on +x is now behind, and the camera at -x:
+
+        >>> half = 0.5**0.5
+        >>> camera = Camera.arcball(
+        ...     (0, half, 0, half), target=(1, 2, 3), distance=5, fov_y=30, near=0.1, far=10
+        ... )
+        >>> (camera.world_from_view[:3, 3].round(12) + 0.0).tolist()
+        [-4.0, 2.0, 3.0]
+        """
+        view = arcball_matrix(quaternion, target, distance)
         return cls(view, "perspective", fov_y=fov_y, near=near, far=far, clip_z=clip_z)
 
     @classmethod
@@ -229,6 +266,32 @@ def look_at_matrix(eye: ArrayLike, target: ArrayLike, up: ArrayLike) -> Floats:
     right /= np.linalg.norm(right)
     rotation = np.stack([right, np.cross(right, forward), -forward])
     return affine(rotation, -rotation @ eye_point)
+
+
+def arcball_matrix(quaternion: ArrayLike, target: ArrayLike, distance: float) -> Floats:
+    """Return `view_from_world` = T(0, 0, -distance) R(quaternion) T(-target).
+
+    Raises
+    ------
+    SceneError
+        If the quaternion is zero, or `distance` is not above 0.
+
+    Examples
+    --------
+    >>> arcball_matrix((0, 0, 0, 1), (1, 2, 3), 5.0)[:3].tolist()
+    [[1.0, 0.0, 0.0, -1.0], [0.0, 1.0, 0.0, -2.0], [0.0, 0.0, 1.0, -8.0]]
+    """
+    from scipy.spatial.transform import Rotation
+
+    turn = float_array("camera.quaternion", quaternion, (4,), limit=LARGEST_LENGTH)
+    length = np.linalg.norm(turn)
+    if length < LEAST_LENGTH:
+        message = f"camera.quaternion must not be zero, got {turn.tolist()}; give (0, 0, 0, 1) for no turn"
+        raise SceneError(message)
+    center = float_array("camera.target", target, (3,), limit=LARGEST_LENGTH)
+    away = number("camera.distance", number("camera.distance", distance, above=0), high=LARGEST_LENGTH)
+    rotation = np.asarray(Rotation.from_quat(turn / length).as_matrix(), dtype=np.float64)
+    return affine(rotation, -rotation @ center - np.array([0.0, 0.0, away]))
 
 
 def _checked_angle(fov_y: float | None) -> float:
