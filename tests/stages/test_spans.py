@@ -2,9 +2,10 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
+import volref as vr
 from tests.oracles import scalar
-from volref.records import Spans
-from volref.stages.spans import box_spans, cut_at_surface
+from volref.records import Rays, Spans
+from volref.stages.spans import box_spans, clip_spans, cut_spans
 
 LOW, HIGH = np.array([-0.5, -0.5, -0.5]), np.array([3.5, 2.5, 1.5])
 
@@ -64,6 +65,29 @@ def test_the_chord_near_an_edge_changes_continuously(offset):
 
 def test_a_surface_ends_the_span_exactly_at_its_distance():
     spans = Spans(np.array([1.0, 1.0, 1.0]), np.array([4.0, 4.0, 4.0]))
-    cut = cut_at_surface(spans, np.array([2.5, np.inf, 0.5]))
+    cut = cut_spans(spans, 0.0, np.array([2.5, np.inf, 0.5]))
     assert cut.t_far.tolist() == [2.5, 4.0, 0.5]
     assert cut.t_near.tolist() == [1.0, 1.0, 1.0]
+
+
+def test_clipped_rays_stay_in_front_of_every_plane():
+    random = np.random.default_rng(3)
+    planes = [vr.Plane(random.normal(size=3), random.normal(size=3)) for _ in range(3)]
+    directions = random.normal(size=(400, 3))
+    directions /= np.linalg.norm(directions, axis=1)[:, None]
+    rays = Rays(random.normal(size=(400, 3)) * 3, directions)
+    spans = clip_spans(rays, planes)
+    t = np.linspace(0, 20, 2001)
+    points = rays.origins[:, None] + t[:, None] * rays.directions[:, None]
+    kept = np.all([plane.height(points) >= 0 for plane in planes], axis=0)
+    inside = (t >= spans.t_near[:, None]) & (t <= spans.t_far[:, None])
+    # They may differ where a sample lies on a plane to rounding, which none of these does.
+    assert (kept == inside).all()
+    assert 0.05 < kept.mean() < 0.6
+
+
+def test_a_ray_along_a_plane_is_kept_in_it_and_in_front_of_it_only():
+    plane = vr.Plane((0, 0, 1), (0, 0, 1))
+    origins = np.array([[0.0, 0, 1], [0, 0, 2], [0, 0, 0.5]])
+    spans = clip_spans(Rays(origins, np.tile([1.0, 0, 0], (3, 1))), [plane])
+    assert (spans.t_near < spans.t_far).tolist() == [True, True, False]

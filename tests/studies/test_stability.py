@@ -332,7 +332,7 @@ def fract_bytes(unit):
     return np.floor(parts * 256).clip(0, 255).astype(np.uint8)
 
 
-def surface_ignored(ranges, _distance):
+def surface_ignored(ranges, _begin, _distance):
     return ranges
 
 
@@ -347,7 +347,7 @@ BREAKS = [
     (spans.box_spans, products_by_the_inverse(np.minimum, np.maximum), ["ray-in-a-face", "rays-in-faces"]),
     (spans.box_spans, products_by_the_inverse(np.fmin, np.fmax), ["ray-in-a-face", "direction-1e-310"]),
     (spans.box_spans, from_behind_the_eye, ["camera-inside", "camera-on-a-face"]),
-    (spans.cut_at_surface, surface_ignored, ["zero-length-span", "camera-inside-a-mesh"]),
+    (spans.cut_spans, surface_ignored, ["zero-length-span", "camera-inside-a-mesh"]),
     (classify.classify, lookup_not_held, ["opacity-rounded-above-1", "extinction-rounded-below-0"]),
     (sampling.trilinear, trilinear_in_float32, ["uint32-extremes", "denormal-values"]),
     (sampling.trilinear, trilinear_by_weights, ["constant-field", "constant-field-on-a-jump"]),

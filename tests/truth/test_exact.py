@@ -52,7 +52,7 @@ def shoot(volume, transfer, origins, directions, tolerance=1e-12, behind=CLEAR, 
         patch.setattr(exact, "pixel_rays", lambda *words: Rays(origins[words[3]], directions[words[3]]))
         lights = np.tile(np.array(behind, float), (count, 1))
         found = exact.integrate_pixels(
-            scene, prepared, np.arange(count), np.full(count, float(distance)), lights, tolerance
+            scene, prepared, np.arange(count), 0.0, np.full(count, float(distance)), lights, tolerance
         )
     return found.rgba, found.bound
 

@@ -146,7 +146,9 @@ def test_a_volume_from_a_file_is_read_from_there(expected, pool, tmp_path, monke
 
     monkeypatch.setattr(tempfile, "TemporaryDirectory", never)
     volume = vr.load_volume(path)
-    loaded = vr.Scene(volume, scene.transfer, scene.camera, scene.width, scene.height, background=scene.background)
+    loaded = vr.Scene(
+        volume, scene.transfer, scene.camera, scene.width, scene.height, background=scene.background
+    )
     for method, words in METHODS.items():
         out = vr.render(loaded, executor=pool, **words)
         assert_same(out, vr.render(loaded, threads=1, **words))

@@ -38,7 +38,8 @@ class Plane:
 
     def height(self, points: Floats) -> Floats:
         """Return how far points (..., 3) lie in front of the plane."""
-        return np.asarray(((points - self.point) * self.normal).sum(axis=-1))
+        x, y, z = np.moveaxis((points - self.point) * self.normal, -1, 0)
+        return np.asarray(x + y + z)
 
 
 def clip_box(low: ArrayLike, high: ArrayLike) -> tuple[Plane, ...]:

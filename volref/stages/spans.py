@@ -1,13 +1,16 @@
 """Stage 2: the part of each ray that is integrated.
 
-R rays in index space: origins and directions are (3, R), and t stays in world units because the
-directions are the images of unit world directions.
+R rays; t is in world units.  Of rays in index space origins and directions are (3, R), and the directions are
+the images of unit world directions.
 """
+
+from collections.abc import Sequence
 
 import numpy as np
 
 from volref.arrays import Floats
-from volref.records import Spans
+from volref.records import Rays, Spans
+from volref.scene.plane import Plane
 
 
 def box_spans(origins: Floats, directions: Floats, low: Floats, high: Floats) -> Spans:
@@ -44,6 +47,33 @@ def box_spans(origins: Floats, directions: Floats, low: Floats, high: Floats) ->
     return Spans(t_near, t_far)
 
 
-def cut_at_surface(spans: Spans, distance: Floats) -> Spans:
-    """End each span at the opaque surface `distance` (R,) away, +inf where there is none."""
-    return Spans(spans.t_near, np.minimum(spans.t_far, distance))
+def cut_spans(spans: Spans, begin: Floats | float, end: Floats) -> Spans:
+    """Return what lies of each span from `begin` (R,) to `end` (R,), as a surface there, +inf without one."""
+    return Spans(np.maximum(spans.t_near, begin), np.minimum(spans.t_far, end))
+
+
+def clip_spans(rays: Rays, planes: Sequence[Plane]) -> Spans:
+    """Return where each ray is in front of all `planes` at t >= 0.
+
+    The height over a plane is h + t (n . d) with h = n . (o - p): it is 0 at t = -h / (n . d).  A ray
+    parallel to a plane is in front of it everywhere (h >= 0) or nowhere.
+
+    Examples
+    --------
+    >>> rays = Rays(np.array([[0.0, 0.0, 5.0]] * 2), np.array([[0.0, 0.0, -1.0], [1.0, 0.0, 0.0]]))
+    >>> spans = clip_spans(rays, [Plane((0, 0, 2), (0, 0, -1)), Plane((0, 0, 0), (0, 0, 1))])
+    >>> spans.t_near.tolist(), spans.t_far.tolist()
+    ([3.0, inf], [5.0, inf])
+    """
+    t_near = np.zeros(len(rays.directions))
+    t_far = np.full(len(rays.directions), np.inf)
+    for plane in planes:
+        height = plane.height(rays.origins)
+        x, y, z = (rays.directions * plane.normal).T  # summed one by one, so that a ray alone is the same
+        rise = x + y + z
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            t = -height / rise
+        hidden = (rise == 0) & (height < 0)
+        np.maximum(t_near, np.where(rise > 0, t, np.where(hidden, np.inf, 0.0)), out=t_near)
+        np.minimum(t_far, np.where(rise < 0, t, np.inf), out=t_far)
+    return Spans(t_near, t_far)

@@ -79,9 +79,9 @@ def choose(scene: Scene, plan: Plan, prepared: Prepared, distance: Floats, behin
     pixels = tiles.ravel()
     on_tiles = distance[pixels], behind[pixels]
     many = np.tile(pixels, REPEATED)
-    truth = integrate_pixels(scene, prepared, pixels, *on_tiles, max(plan.tolerance * TRUER, 1e-12))
+    truth = integrate_pixels(scene, prepared, pixels, 0.0, *on_tiles, max(plan.tolerance * TRUER, 1e-12))
     started = time.perf_counter()
-    integrate_pixels(scene, prepared, pixels, *on_tiles, plan.tolerance)
+    integrate_pixels(scene, prepared, pixels, 0.0, *on_tiles, plan.tolerance)
     exactly = (time.perf_counter() - started) / len(pixels)
     busy = max(float((truth.bound > 0).mean()), 1e-3)  # pixels that cost nothing are never left
 
@@ -91,7 +91,7 @@ def choose(scene: Scene, plan: Plan, prepared: Prepared, distance: Floats, behin
             return None
         field = field_of(scene, marching)
         started = time.perf_counter()
-        chunk = march_chunk(scene, marching, field, many, distance[many], behind[many], Workspace())
+        chunk = march_chunk(scene, marching, field, many, 0.0, distance[many], behind[many], Workspace())
         seconds = (time.perf_counter() - started) / len(many)
         error = np.abs(chunk.rgba[: len(pixels)] - truth.rgba).max(axis=1)
         around = around_each(chunk.bound[: len(pixels)].reshape(tiles.shape)).ravel()

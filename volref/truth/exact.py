@@ -27,7 +27,7 @@ from volref.stages.models import FEW_BENDS, Models, look_up, models_of, piece_of
 from volref.stages.radiance import ROUNDOFF, Gathered, gathered
 from volref.stages.rays import pixel_rays
 from volref.stages.sampling import PAD, Grid, cell_corners, grid_of, trilinear
-from volref.stages.spans import box_spans, cut_at_surface
+from volref.stages.spans import box_spans, cut_spans
 from volref.stages.splitting import split_at_bends, split_evenly, split_geometrically, value_range
 from volref.truth.modelling import Solved, modelled
 from volref.workspace import Workspace
@@ -104,29 +104,35 @@ def integrate_pixels(
     scene: Scene,
     prepared: Prepared,
     pixels: Indices,
+    begin: Floats | float,
     distance: Floats,
     behind: Floats,
     tolerance: float,
 ) -> "Integral":
-    """Integrate along the rays of `pixels` (R,) to `distance` (R,), over what lies `behind` (R, 4)."""
+    """Integrate the rays of `pixels` (R,) from `begin` (R,) to `distance` (R,) over `behind` (R, 4)."""
     rays = pixel_rays(scene.camera, scene.width, scene.height, pixels)
     origins = transform_points(prepared.index_from_world, rays.origins).T
     directions = transform_directions(prepared.index_from_world, rays.directions).T
-    spans = cut_at_surface(box_spans(origins, directions, prepared.low, prepared.high), distance)
-    origins, rests, spans, ends = _recentred(prepared, origins, directions, spans, distance)
+    spans = cut_spans(box_spans(origins, directions, prepared.low, prepared.high), begin, distance)
+    origins, rests, spans, ends = _recentred(prepared, origins, directions, spans, begin, distance)
     done = integrate(prepared, origins, rests, directions, spans, behind, tolerance)
     done.bound[:] += _error_of_ends(prepared, origins, directions, spans, ends, behind, done)
     return done
 
 
 def _recentred(
-    prepared: Prepared, origins: Floats, directions: Floats, spans: Spans, distance: Floats
+    prepared: Prepared,
+    origins: Floats,
+    directions: Floats,
+    spans: Spans,
+    begin: Floats | float,
+    distance: Floats,
 ) -> tuple[Floats, Floats, Spans, Spans]:
     """Return padded origins in the middle of the spans, their rests, the spans from there, and their errors.
 
-    The ends of the spans are computed afresh but for one at the origin, or at a surface.  The distance of a
-    face, (face - o) / d, is off by 3 u of itself with u the unit roundoff, and by the rest of the origin over
-    d.
+    The ends of the spans are computed afresh but for one where the ray begins, or at a surface.  The distance
+    of a face, (face - o) / d, is off by 3 u of itself with u the unit roundoff, and by the rest of the origin
+    over d.
     """
     moved, rests, kept = recentred(origins, directions, spans, PAD)  # empty spans keep their origins
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
@@ -140,14 +146,16 @@ def _recentred(
     at_near, at_far = (np.take_along_axis(errors, axis, axis=0)[0] for axis in (near_axis, far_axis))
     near, far = near.max(axis=0), far.min(axis=0)
     inside = spans.t_far > spans.t_near
-    # Ends at the origin or at a surface are what they are.
-    at_face = spans.t_near > 0, spans.t_far < distance
+    at_near += 3 * ROUNDOFF * np.abs(near)
+    at_far += 3 * ROUNDOFF * np.abs(far)
+    # Where a ray begins, and a surface, are what they are, unless rounding alone puts them before a face.
+    at_face = spans.t_near > begin, spans.t_far < distance
+    at_near[~(inside & (at_face[0] | (near + at_near > kept.t_near)))] = 0.0
+    at_far[~(inside & (at_face[1] | (far - at_far < kept.t_far)))] = 0.0
     near, far = (
         np.where(inside & at_face[0], near, kept.t_near),
         np.where(inside & at_face[1], far, kept.t_far),
     )
-    at_near = np.where(inside & at_face[0], at_near + 3 * ROUNDOFF * np.abs(near), 0.0)
-    at_far = np.where(inside & at_face[1], at_far + 3 * ROUNDOFF * np.abs(far), 0.0)
     near, at_near = _touching(spans, at_face, near, at_near)
     return moved, rests, Spans(near, np.maximum(near, far)), Spans(at_near, at_far)
 

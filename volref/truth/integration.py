@@ -9,9 +9,13 @@ import threading
 from dataclasses import dataclass
 from functools import cached_property
 
+import numpy as np
+
 from volref.arrays import Floats, Indices
 from volref.planning import Plan
 from volref.scene.scene import Scene
+from volref.stages.rays import pixel_rays
+from volref.stages.spans import clip_spans
 from volref.truth.exact import Prepared, integrate_pixels, prepare
 from volref.truth.march import Field, field_of, march_chunk
 from volref.workspace import Workspace
@@ -52,11 +56,26 @@ class Integration:
         _ = self.field if self.plan.method == "march" else self.prepared
 
     def integrate(self, pixels: Indices, distance: Floats, behind: Floats, tolerance: float) -> Integrated:
-        """Integrate the rays of `pixels` to `distance` (R,) over what lies `behind` (R, 4)."""
+        """Integrate the rays of `pixels` to `distance` (R,), or to where they are cut off, over `behind`."""
+        begin, end = self.limits(pixels, distance)
+        return self.between(pixels, begin, end, behind, tolerance)
+
+    def limits(self, pixels: Indices, distance: Floats) -> tuple[Floats | float, Floats]:
+        """Return where the rays of `pixels` begin, and where they end if not at `distance` (R,)."""
+        scene = self.scene
+        if not scene.clip:
+            return 0.0, distance
+        kept = clip_spans(pixel_rays(scene.camera, scene.width, scene.height, pixels), scene.clip)
+        return kept.t_near, np.minimum(kept.t_far, distance)
+
+    def between(
+        self, pixels: Indices, begin: Floats | float, end: Floats, behind: Floats, tolerance: float
+    ) -> Integrated:
+        """Integrate the rays of `pixels` from `begin` (R,) to `end` (R,) over what lies `behind` (R, 4)."""
         if self.plan.method == "march":
-            chunk = march_chunk(self.scene, self.plan, self.field, pixels, distance, behind, _workspace())
+            chunk = march_chunk(self.scene, self.plan, self.field, pixels, begin, end, behind, _workspace())
             return Integrated(chunk.rgba, chunk.bound, chunk.samples, worker())
-        done = integrate_pixels(self.scene, self.prepared, pixels, distance, behind, tolerance)
+        done = integrate_pixels(self.scene, self.prepared, pixels, begin, end, behind, tolerance)
         return Integrated(done.rgba, done.bound, done.pieces, worker())
 
 

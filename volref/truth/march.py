@@ -36,7 +36,7 @@ from volref.stages.classify import Table, classify, lookup_table, segment_opacit
 from volref.stages.composite import composite_block, composite_block_coarse, over
 from volref.stages.rays import pixel_rays
 from volref.stages.sampling import PAD, Grid, grid_of, trilinear
-from volref.stages.spans import box_spans, cut_at_surface
+from volref.stages.spans import box_spans, cut_spans
 from volref.truth.skipping import blocks_to_march
 from volref.workspace import Workspace
 
@@ -122,11 +122,12 @@ def march_chunk(
     plan: Plan,
     field: Field,
     pixels: Indices,
+    begin: Floats | float,
     distance: Floats,
     behind: Floats,
     work: Workspace,
 ) -> Chunk:
-    """March the rays of `pixels` (R,) to `distance` (R,) and put the result over `behind` (R, 4).
+    """March the rays of `pixels` (R,) from `begin` (R,) to `distance` (R,), over what lies `behind` (R, 4).
 
     The bound is an estimate: the difference to the midpoint rule at three times the step, plus what rounding
     may be off, plus what lies behind an early end, which is certain.  Where the leading term of the error
@@ -138,7 +139,7 @@ def march_chunk(
     origins = transform_points(field.index_from_world, eyes).T
     directions = transform_directions(field.index_from_world, rays.directions).T
     origins = np.broadcast_to(origins, directions.shape)
-    spans = cut_at_surface(box_spans(origins, directions, field.low, field.high), distance)
+    spans = cut_spans(box_spans(origins, directions, field.low, field.high), begin, distance)
     state = _state_of(plan, field, origins, directions, spans)
     rgba, bound, samples = behind.copy(), np.zeros(len(pixels)), 0
     for part in _marched(plan, field, state, work):

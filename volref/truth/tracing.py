@@ -20,7 +20,7 @@ from volref.scene.transform import transform_directions, transform_points
 from volref.stages.classify import classify, segment_opacity
 from volref.stages.rays import pixel_rays
 from volref.stages.sampling import PAD, trilinear
-from volref.stages.spans import box_spans, cut_at_surface
+from volref.stages.spans import box_spans, cut_spans
 from volref.truth.canvas import light_behind
 from volref.truth.march import Field, field_of, segments_of
 from volref.truth.rendering import decide
@@ -128,7 +128,7 @@ def _trace_volume(scene: Scene, plan: Plan, rays: Rays, distance: float, head: d
     origin = transform_points(field.index_from_world, rays.origins).T
     direction = transform_directions(field.index_from_world, rays.directions).T
     box = box_spans(origin, direction, field.low, field.high)
-    spans = cut_at_surface(box, np.array([distance]))
+    spans = cut_spans(box, 0.0, np.array([distance]))
     t_near, t_far = float(spans.t_near[0]), float(spans.t_far[0])
     if t_near >= t_far:
         missed = box.t_near[0] >= box.t_far[0]

@@ -28,5 +28,5 @@ def truth_of(problem: Problem) -> Truth:
     distance = np.full(len(pixels), np.inf) if surface is None else surface.distance.reshape(-1)[pixels]
     behind = np.where(np.isfinite(distance)[:, None], (*MESH_COLOR, 1.0), 0.0)
     prepared = prepare(scene, vr.plan(scene, method="exact", tolerance=TOLERANCE))
-    found = integrate_pixels(scene, prepared, pixels, distance, behind, TOLERANCE)
+    found = integrate_pixels(scene, prepared, pixels, 0.0, distance, behind, TOLERANCE)
     return Truth(found.rgba, found.bound)

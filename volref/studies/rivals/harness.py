@@ -17,7 +17,7 @@ from volref.scene.transform import transform_directions, transform_points
 from volref.stages.composite import over
 from volref.stages.rays import pixel_rays
 from volref.stages.sampling import PAD
-from volref.stages.spans import box_spans, cut_at_surface
+from volref.stages.spans import box_spans, cut_spans
 from volref.studies.rivals.medium import Bundle, Integrator, Medium, medium_of
 from volref.studies.rivals.table import Rival
 from volref.truth.canvas import light_behind
@@ -120,7 +120,7 @@ def _chunk(
     directions = transform_directions(field.index_from_world, rays.directions).T
     spans = box_spans(origins, directions, field.low, field.high)
     if surface is not None:
-        spans = cut_at_surface(spans, surface.distance.reshape(-1)[pixels])
+        spans = cut_spans(spans, 0.0, surface.distance.reshape(-1)[pixels])
     length = spans.t_far - spans.t_near
     hit = np.flatnonzero(length > 0)
     order = hit[np.argsort(-length[hit], kind="stable")]

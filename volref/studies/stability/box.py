@@ -79,7 +79,7 @@ def _past_an_edge() -> Measured:
 
 def _surface_on_the_face() -> Measured:
     ends = Spans(np.array([3.0, 3.0]), np.array([7.0, 7.0]))
-    cut = spans_stage.cut_at_surface(ends, np.array([3.0, np.nextafter(3.0, 4.0)]))
+    cut = spans_stage.cut_spans(ends, 0.0, np.array([3.0, np.nextafter(3.0, 4.0)]))
     length = cut.t_far - cut.t_near
     whole_steps = np.ceil(np.maximum(length, 1e-4) / 0.5) * 0.5
     return measured([0.0, 2 * EPS], whole_steps, length, 0.0)

@@ -106,7 +106,14 @@ def _opaque_at_once() -> Measured:
     background = (0.2, 0.2, 0.2, 1.0)
     inside = separable_image(Scene(volume, one_value(1.0), _oblique(), 8, 8))[..., 3:] > 0
     scenes = [
-        Scene(volume, TransferFunction([0.5], [COLOR], None, [1.0], unit), _oblique(), 8, 8, background=background)
+        Scene(
+            volume,
+            TransferFunction([0.5], [COLOR], None, [1.0], unit),
+            _oblique(),
+            8,
+            8,
+            background=background,
+        )
         for unit in (1.0, 100.0)
     ]
     truth = np.where(inside, (*COLOR, 1.0), background)
