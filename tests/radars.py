@@ -5,7 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
-from volref.scene.radar import RadarVolume, Sweep
+from volref.scene.radar import RadarVolume
+from volref.scene.sweep import Sweep
 
 KNMI = Path(__file__).parent / "data" / "radar_knmi_denhelder_20110610.npz"
 

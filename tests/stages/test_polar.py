@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 from tests.oracles import polar as loop
 from tests.radars import knmi, uneven
 from volref.scene.beams import world_of_beam
-from volref.scene.radar import RadarVolume, Sweep
+from volref.scene.radar import RadarVolume
+from volref.scene.sweep import Sweep
 from volref.stages.polar import centred_spherical, polar_lookup, printed_spherical, radar_table
 
 # Polar coordinates are rounded to about 4 eps; the steepest step is some 80 dB over a share of a gate, a

@@ -21,7 +21,8 @@ import numpy as np
 
 from volref.arrays import Booleans, Floats, Indices, Integers, Numbers
 from volref.scene.beams import beam_of_world
-from volref.scene.radar import RadarVolume, Sweep
+from volref.scene.radar import RadarVolume
+from volref.scene.sweep import Sweep
 
 # A point this near to a gate's centre, a radial or a sweep (in gates, shares and degrees) lies on it: its
 # polar coordinates are rounded in the 12th digit.
