@@ -13,7 +13,7 @@ from volref.io import scene_schema
 from volref.io.documents import KEYWORDS, TYPES, check_document, find_problem, whole_numbers
 from volref.io.guard import read_json
 from volref.io.raw import RAW_TYPES
-from volref.io.volumes import READERS
+from volref.io.readers import READERS
 from volref.scene.volume import IDENTITY
 
 SCHEMA = scene_schema()

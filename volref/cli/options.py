@@ -228,7 +228,7 @@ def read_statements(options: argparse.Namespace) -> dict[str, Any]:
     """
     from volref.io.guard import nearest
     from volref.io.placement import GEOMETRY
-    from volref.io.volumes import READERS
+    from volref.io.readers import READERS
 
     known = {*GEOMETRY, *(key for reader in READERS.values() for key in reader.keys)}
     for key, _ in options.statements:

@@ -11,12 +11,14 @@ from volref.errors import FormatError
 from volref.io.atlas import AtlasLayout, square_layout, write_atlas
 from volref.io.atomic import check_free, write_text
 from volref.io.guard import DEFAULT_MAX_BYTES, nearest, one_line
+from volref.io.mha import write_mha
 from volref.io.nifti import write_nifti
 from volref.io.npy import write_npy, write_npz
 from volref.io.nrrd import write_nrrd
 from volref.io.raw import write_raw
+from volref.io.readers import ATLAS_KEYS
 from volref.io.scenes import document_of_placement
-from volref.io.volumes import ATLAS_KEYS, load_volume
+from volref.io.volumes import load_volume
 from volref.scene.volume import Volume
 
 
@@ -46,7 +48,7 @@ def convert_volume(
 def save_volume(
     volume: Volume, path: str | Path, *, overwrite: bool = False, layout: AtlasLayout | None = None
 ) -> None:
-    """Write a volume as .npy, .npz, .nrrd, .nii, .nii.gz, .raw or a .png atlas.
+    """Write a volume as .npy, .npz, .nrrd, .nii, .nii.gz, .mha, .raw or a .png atlas.
 
     Values are never changed.  Where the format has no place for the geometry (.npy, .raw, .png) it stands in
     a JSON file beside the data, `<name>.json`, which `load_volume` reads; the other formats leave none, and
@@ -109,6 +111,11 @@ def _write_nifti(file: Path, volume: Volume, options: _Options) -> _Statement:
     return None
 
 
+def _write_mha(file: Path, volume: Volume, options: _Options) -> _Statement:
+    write_mha(file, volume, overwrite=options.overwrite)
+    return None
+
+
 def _write_raw(file: Path, volume: Volume, options: _Options) -> _Statement:
     return write_raw(file, volume.values, overwrite=options.overwrite)
 
@@ -125,6 +132,7 @@ _WRITERS: dict[str, Callable[[Path, Volume, _Options], _Statement]] = {
     ".nrrd": _write_nrrd,
     ".nii": _write_nifti,
     ".nii.gz": _write_nifti,
+    ".mha": _write_mha,
     ".raw": _write_raw,
     ".png": _write_atlas,
 }

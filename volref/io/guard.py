@@ -10,7 +10,7 @@ import importlib
 import json
 import math
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path, PureWindowsPath
 from types import ModuleType
 from typing import Any, TypeAlias
@@ -54,6 +54,20 @@ def existing_file(path: str | Path) -> Path:
         message = f"{file.name} must hold data, got an empty file; write it again"
         raise FormatError(message)
     return file
+
+
+def existing_path(path: str | Path) -> Path:
+    """Return `path` after checking that it is a folder, or a file with something in it.
+
+    Raises
+    ------
+    FormatError
+        If it is neither.
+    """
+    with suppress(OSError, ValueError):
+        if Path(path).is_dir():
+            return Path(path).resolve()
+    return existing_file(path)
 
 
 def path_inside(file: Path, text: str, *, allow_outside: bool | None = None) -> Path:

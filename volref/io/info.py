@@ -8,16 +8,17 @@ import numpy as np
 from volref.errors import FormatError
 from volref.io.block_cache import cache_path
 from volref.io.documents import check_format
-from volref.io.guard import DEFAULT_MAX_BYTES, existing_file, one_line, read_json
+from volref.io.guard import DEFAULT_MAX_BYTES, existing_path, one_line, read_json
 from volref.io.images import read_image
 from volref.io.meshes import SUFFIXES, load_meshes
 from volref.io.npy import npz_headers, read_npy
 from volref.io.png import read_png_header
+from volref.io.readers import is_volume_path
 from volref.io.scenes import FORMAT as SCENE_FORMAT
 from volref.io.scenes import document_of_placement, load_scene
 from volref.io.transfer import FORMAT as TRANSFER_FORMAT
 from volref.io.transfer import load_transfer
-from volref.io.volumes import is_volume_path, load_volume
+from volref.io.volumes import load_volume
 from volref.scene.mesh import Mesh
 from volref.scene.scene import Scene
 from volref.scene.transfer import TransferFunction
@@ -38,10 +39,10 @@ def describe_file(
     FormatError, SceneError
         If the file cannot be read as what its suffix and contents say it is.
     """
-    file = existing_file(path)
+    file = existing_path(path)
     told: dict[str, Any] = dict(statement)
     kind = "volume" if statement else _kind_of(file, max_bytes)
-    about: dict[str, Any] = {"kind": kind, "file": file.name, "file_bytes": file.stat().st_size}
+    about: dict[str, Any] = {"kind": kind, "file": file.name, "file_bytes": _bytes_of(file)}
     if kind == "volume":
         beside = cache_path(file.resolve())
         kept = {"block_ranges": beside.name} if beside.is_file() else {}
@@ -126,6 +127,8 @@ def describe_scene(scene: Scene) -> dict[str, Any]:
 
 
 def _kind_of(file: Path, max_bytes: int) -> str:
+    if file.is_dir():
+        return "volume"
     suffix = file.suffix.lower()
     if suffix in (".npy", ".png") and file.with_name(file.name + ".json").is_file():
         return "volume"
@@ -173,6 +176,13 @@ def _describe_image(file: Path, max_bytes: int) -> dict[str, Any]:
         "color_range": [float(image[..., :3].min()), float(image[..., :3].max())],
         "alpha_range": [float(alpha.min()), float(alpha.max())],
     }
+
+
+def _bytes_of(path: Path) -> int:
+    """Return the size of a file, or of all files in a folder."""
+    if path.is_file():
+        return path.stat().st_size
+    return sum(file.stat().st_size for file in path.rglob("*") if file.is_file())
 
 
 def _bounds(points: np.ndarray[Any, np.dtype[np.float64]]) -> list[list[float]]:

@@ -4,34 +4,18 @@ Every reader returns the samples (nz, ny, nx) and what the file says about their
 beside it (keyword arguments, then a JSON file called `<name>.json`, as in `head.raw.json`) comes first.
 """
 
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any, NamedTuple, TypeAlias
+from typing import NamedTuple
 from weakref import WeakKeyDictionary
 
-import numpy as np
-
-from volref.arrays import Numbers, whole_number
+from volref.arrays import whole_number
 from volref.errors import FormatError
-from volref.io.atlas import AtlasLayout, read_atlas
 from volref.io.block_cache import keep_beside
 from volref.io.documents import whole_numbers
-from volref.io.guard import DEFAULT_MAX_BYTES, existing_file, nearest, one_line, read_json, wrapped
-from volref.io.nifti import read_nifti
-from volref.io.npy import chosen_array, npz_headers, read_npy, read_npz
-from volref.io.nrrd import is_detached, read_nrrd
-from volref.io.placement import GEOMETRY, SIGNS, placement_of_affine
-from volref.io.raw import read_raw
+from volref.io.guard import DEFAULT_MAX_BYTES, existing_file, existing_path, nearest, one_line, read_json
+from volref.io.placement import GEOMETRY
+from volref.io.readers import Statement, reader_of
 from volref.scene.volume import Volume
-
-Statement: TypeAlias = dict[str, Any]
-Found: TypeAlias = tuple[Numbers, Statement]
-
-RAW_KEYS = ("size", "dtype", "byte_order", "skip", "spacing")
-ATLAS_NEEDED = ("tiles_across", "tiles_down", "slices")
-ATLAS_KEYS = (*ATLAS_NEEDED, "first_tile", "rows", "channel", "padding")
-# Names of matrices from (i, j, k) to the world in .npz files, with the space they lead to.
-AFFINES = {"affine_ijk_to_ras_mm": "ras", "affine_ijk_to_lps_mm": "lps"}
 
 
 def load_volume(
@@ -53,6 +37,9 @@ def load_volume(
                             arrays that say the same twice must agree to 5 digits, and a matrix is taken
     .nrrd .nhdr             NRRD (extra `nrrd`)
     .nii .nii.gz            NIfTI (extra `nifti`)
+    .mha .mhd               MetaImage
+    .dcm, a folder          DICOM series (extra `dicom`): a folder of slices, or one of them; of several
+                            series the one whose SeriesInstanceUID is `key`
     .raw .bin               needs size, dtype, byte_order, skip and spacing, see `load_raw`
     .png                    slice atlas, needs tiles_across, tiles_down and slices, see `volref.io.atlas`
     ======================  ==============================================================================
@@ -64,9 +51,9 @@ def load_volume(
     max_bytes
         The most memory the samples may take; a file that would take more is refused before it is read.
     statement
-        spacing, origin, direction, centering: in place of what the file says.  For .npz also `key`, the
-        name of the array; for RAW and atlases what the table names.  The same names may stand in a JSON
-        file beside the volume, called like it with `.json` added.
+        spacing, origin, direction, centering: in place of what the file says.  `key`: the name of the array
+        or of the series.  For RAW and atlases what the table names.  The same names may stand in a JSON file
+        beside the volume, called like it with `.json` added.
 
     Raises
     ------
@@ -75,8 +62,8 @@ def load_volume(
     SceneError
         If the volume breaks a rule of `Volume`.
     """
-    file = existing_file(path)
-    reader = _reader_of(file)
+    file = existing_path(path)
+    reader = reader_of(file)
     stated = {**_sidecar(file), **statement}
     for name in stated:
         if name not in (*GEOMETRY, *reader.keys):
@@ -94,9 +81,12 @@ def load_volume(
     origin = Origin(file.resolve(), file_state(file), nan, own)
     values, said = reader.read(file, own, limit)
     placed = {**said, **{name: stated[name] for name in GEOMETRY if name in stated}}
+    if not reader.placed and "spacing" not in placed:
+        message = f"{file.name} must state its spacing (sx, sy, sz), got none; pass spacing= or write it to "
+        raise FormatError(message + f"{file.name}.json")
     volume = Volume(values, nan=nan, **placed)
     keep_beside(volume, file)
-    if reader.kind != "NRRD" or not is_detached(file):
+    if reader.alone(file):
         _ORIGINS[volume] = origin
     return volume
 
@@ -127,7 +117,7 @@ def read_again(path: Path, nan: str | float, own: Statement, placement: Statemen
     FormatError, SceneError
         If the file cannot be read.
     """
-    values, _ = _reader_of(path).read(existing_file(path), own, 2**62)
+    values, _ = reader_of(path).read(existing_file(path), own, 2**62)
     volume = Volume(values, nan=nan, **placement)
     keep_beside(volume, path)
     return volume
@@ -139,13 +129,8 @@ def file_state(path: Path) -> tuple[int, ...]:
     return found.st_dev, found.st_ino, found.st_size, found.st_mtime_ns
 
 
-def is_volume_path(path: Path) -> bool:
-    """Say whether `load_volume` knows the suffix."""
-    return _suffix(path) in READERS
-
-
 def _sidecar(file: Path) -> Statement:
-    beside = file.with_name(file.name + ".json")
+    beside = file.parent / (file.name + ".json")
     if not beside.is_file():
         return {}
     stated = read_json(beside)
@@ -155,97 +140,3 @@ def _sidecar(file: Path) -> Statement:
         return whole
     message = f"{beside.name} must hold a JSON object, got {type(stated).__name__}; write {{name: value}}"
     raise FormatError(message)
-
-
-def _read_npy(file: Path, _: Statement, max_bytes: int) -> Found:
-    return read_npy(file, max_bytes), {}
-
-
-def _read_npz(file: Path, own: Statement, max_bytes: int) -> Found:
-    name = chosen_array(file, npz_headers(file), own.get("key"), "volume", 3)
-    values = read_npz(file, (name,), max_bytes)[name]
-    said = read_npz(file, (*GEOMETRY, "spacing_zyx", *AFFINES), 2**20)
-    places: dict[str, Statement] = {key: {key: said[key].tolist()} for key in GEOMETRY if key in said}
-    if "spacing_zyx" in said:
-        places["spacing_zyx"] = {"spacing": np.ravel(said["spacing_zyx"])[::-1].tolist()}
-    for key, space in AFFINES.items():
-        if key in said:
-            affine = np.asarray(said[key])
-            if affine.shape != (4, 4) or affine.dtype.kind not in "iuf":
-                message = f"{file.name} must hold {key} as 4 x 4 numbers, got {affine.dtype} of shape "
-                raise FormatError(message + f"{affine.shape}; save a matrix from (i, j, k) to the world")
-            places[key] = placement_of_affine(affine, SIGNS[space])
-    return values, _joined(file, places)
-
-
-def _joined(file: Path, places: dict[str, Statement]) -> Statement:
-    """Return what several arrays say of one place, the last (a matrix) as it is, if they do not differ."""
-    joined: Statement = {}
-    for name, said in places.items():
-        for key in joined.keys() & said.keys():
-            with wrapped(file, ".npz file"):
-                first, second = (np.asarray(value, dtype=np.float64) for value in (joined[key], said[key]))
-                # 1e-4: a number beside a matrix may be rounded to 5 digits.
-                same = first.shape == second.shape and bool(
-                    (np.abs(first - second) <= 1e-4 * np.abs(second).max()).all()
-                )
-            if not same:
-                message = f"{file.name} must state its {key} once, got {one_line(str(joined[key]))} and, by "
-                message += f"{name}, {one_line(str(said[key]))}; "
-                raise FormatError(message + "remove the array that is wrong")
-        joined |= said
-    return joined
-
-
-def _read_nrrd(file: Path, _: Statement, max_bytes: int) -> Found:
-    return read_nrrd(file, max_bytes)
-
-
-def _read_nifti(file: Path, _: Statement, max_bytes: int) -> Found:
-    return read_nifti(file, max_bytes)
-
-
-def _read_raw(file: Path, own: Statement, max_bytes: int) -> Found:
-    return read_raw(file, own["size"], own["dtype"], own["byte_order"], own["skip"], max_bytes), {}
-
-
-def _read_atlas(file: Path, own: Statement, max_bytes: int) -> Found:
-    return read_atlas(file, AtlasLayout(**own), max_bytes), {}
-
-
-class _Reader(NamedTuple):
-    """A format: what to call it, what reads it, which statements it takes, and which it needs."""
-
-    kind: str
-    read: Callable[[Path, Statement, int], Found]
-    keys: tuple[str, ...] = ()
-    needed: tuple[str, ...] = ()
-
-
-_NRRD = _Reader("NRRD", _read_nrrd)
-_NIFTI = _Reader("NIfTI", _read_nifti)
-_RAW = _Reader("RAW", _read_raw, RAW_KEYS[:4], RAW_KEYS)
-
-READERS = {
-    ".npy": _Reader(".npy", _read_npy),
-    ".npz": _Reader(".npz", _read_npz, ("key",)),
-    ".nrrd": _NRRD,
-    ".nhdr": _NRRD,
-    ".nii": _NIFTI,
-    ".nii.gz": _NIFTI,
-    ".raw": _RAW,
-    ".bin": _RAW,
-    ".png": _Reader("PNG atlas", _read_atlas, ATLAS_KEYS, ATLAS_NEEDED),
-}
-
-
-def _suffix(path: Path) -> str:
-    return ".nii.gz" if path.name.lower().endswith(".nii.gz") else path.suffix.lower()
-
-
-def _reader_of(file: Path) -> _Reader:
-    reader = READERS.get(_suffix(file))
-    if reader is not None:
-        return reader
-    message = f"{one_line(file.name)} must end in {', '.join(READERS)}, got {file.suffix!r}; "
-    raise FormatError(message + "convert it to NRRD or NIfTI")

@@ -1,0 +1,81 @@
+"""Where each voxel of each format lies, against what the library that wrote the file says of it.
+
+The volume is a letter F of unequal slices; the places are oblique, anisotropic and mirrored in turn.
+NRRD and NIfTI are held in the same way in test_volumes.py.
+"""
+
+import metaimageio
+import numpy as np
+import pydicom
+import pytest
+
+from tests.dicom_files import write_series
+from tests.letters import FLIP_LPS, FLIPS, assert_places_equal, letter_f, oblique
+from volref.io import load_volume, save_volume
+
+LPS = np.diag([-1.0, -1.0, 1.0, 1.0])
+
+
+def mha_place(affine):
+    """Return what metaimageio is told of a matrix to LPS."""
+    spacing = np.linalg.norm(affine[:3, :3], axis=0)
+    return {
+        "Offset": affine[:3, 3],
+        "TransformMatrix": affine[:3, :3] / spacing,
+        "ElementSpacing": spacing,
+    }
+
+
+@pytest.mark.parametrize("flips", FLIPS)
+@pytest.mark.parametrize("name", ["f.mha", "packed.mha", "f.mhd", "packed.mhd"])
+def test_each_voxel_of_a_metaimage_lies_where_its_library_puts_it(tmp_path, flips, name):
+    packed = {"CompressedData": True} if "packed" in name else {}
+    metaimageio.write(tmp_path / name, letter_f(), **mha_place(oblique(flips=flips)), **packed)
+    theirs, said = metaimageio.read(tmp_path / name)
+    affine = metaimageio.util.get_transform(said) @ np.diag([*said["ElementSpacing"], 1.0])
+    assert_places_equal(load_volume(tmp_path / name), LPS @ affine, theirs)
+
+
+def test_a_metaimage_of_the_other_byte_order_gives_native_numbers(tmp_path):
+    metaimageio.write(tmp_path / "f.mhd", letter_f())
+    text = (tmp_path / "f.mhd").read_text().replace("ByteOrderMSB = False", "ByteOrderMSB = True")
+    (tmp_path / "f.mhd").write_text(text)
+    letter_f().astype(">i2").tofile(tmp_path / "f.raw")
+    assert np.array_equal(load_volume(tmp_path / "f.mhd").values, letter_f())
+
+
+@pytest.mark.parametrize("flips", FLIPS)
+def test_metaimageio_reads_what_save_volume_writes(tmp_path, flips):
+    affine = oblique(flips=flips)
+    metaimageio.write(tmp_path / "f.mha", letter_f(), **mha_place(affine))
+    ours = load_volume(tmp_path / "f.mha")
+    save_volume(ours, tmp_path / "g.mha")
+    theirs, said = metaimageio.read(tmp_path / "g.mha")
+    placed = metaimageio.util.get_transform(said) @ np.diag([*said["ElementSpacing"], 1.0])
+    assert_places_equal(ours, LPS @ placed, theirs)
+
+
+# nibabel warns at import that it reads few kinds of DICOM; what is used here is its matrix of one slice.
+@pytest.mark.filterwarnings("ignore:The DICOM readers are highly experimental:UserWarning")
+@pytest.mark.parametrize("flips", FLIPS)
+def test_each_voxel_of_a_dicom_series_lies_where_nibabel_puts_its_slice(tmp_path, flips):
+    """nibabel takes a voxel of one slice as (row, column, 0) to LPS."""
+    from nibabel.nicom.dicomwrappers import wrapper_from_data
+
+    affine = oblique(flips=flips)
+    write_series(tmp_path, letter_f(), affine)
+    ours = load_volume(tmp_path)
+    placed = {}
+    for file in tmp_path.iterdir():
+        data = pydicom.dcmread(file)
+        theirs = wrapper_from_data(data).affine
+        for j, row in enumerate(data.pixel_array):
+            for i, code in enumerate(row):
+                point = FLIP_LPS @ (theirs @ [j, i, 0, 1])[:3]
+                placed[tuple(np.round(point, 6) + 0.0)] = int(code)
+    assert len(placed) == letter_f().size
+    nz, ny, nx = ours.values.shape
+    for k, j, i in np.ndindex(nz, ny, nx):
+        point = (ours.world_from_index @ [i, j, k, 1])[:3]
+        # Positions are texts of 16 characters: 11 digits behind the point here.
+        assert placed[tuple(np.round(point, 6) + 0.0)] == ours.values[k, j, i]
