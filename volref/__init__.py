@@ -54,6 +54,7 @@ if TYPE_CHECKING:
         clip_box,
     )
     from volref.scene.arcball import arcball_rotation, drag
+    from volref.tonemap import tone_map
     from volref.truth.rendering import render
     from volref.truth.result import Render
     from volref.truth.tracing import Trace, trace
@@ -103,6 +104,7 @@ __all__ = [
     "save_transfer",
     "save_volume",
     "scene_schema",
+    "tone_map",
     "trace",
     "verify",
     "write_image",
@@ -128,6 +130,7 @@ _HOMES = {
         "clip_box",
     ),
     "volref.scene.arcball": ("arcball_rotation", "drag"),
+    "volref.tonemap": ("tone_map",),
     "volref.truth.rendering": ("render",),
     "volref.truth.result": ("Render",),
     "volref.truth.tracing": ("Trace", "trace"),

@@ -8,7 +8,10 @@ import numpy as np
 
 from volref.arrays import Bytes, Floats, one_of
 
-ENCODINGS = ("srgb", "none")
+ENCODINGS = ("srgb", "gamma2.2", "none")
+
+# The exponent of "gamma2.2": what shaders that say pow(c, 1 / 2.2) do (VPT among them).
+GAMMA = 2.2
 
 
 def straight_from_premultiplied(rgba: Floats) -> Floats:
@@ -47,6 +50,26 @@ def decode_srgb(code: Floats) -> Floats:
     """Return linear light of sRGB code values in 0..1; the inverse of `encode_srgb`."""
     value = np.maximum(code, 0.0)
     return np.where(value <= 12.92 * 0.0031308, value / 12.92, ((value + 0.055) / 1.055) ** 2.4)
+
+
+def encode_light(light: Floats, encoding: str) -> Floats:
+    """Return code values in 0..1 of light: "srgb", "gamma2.2" (light^(1/2.2)), or "none" as it is.
+
+    Examples
+    --------
+    >>> encode_light(np.array([0.0, 0.5, 1.0]), "gamma2.2").round(6).tolist()
+    [0.0, 0.72974, 1.0]
+    """
+    if one_of("encoding", encoding, ENCODINGS) == "none":
+        return light
+    return encode_srgb(light) if encoding == "srgb" else np.maximum(light, 0.0) ** (1 / GAMMA)
+
+
+def decode_light(code: Floats, encoding: str) -> Floats:
+    """Return the light of code values; the inverse of `encode_light`."""
+    if one_of("encoding", encoding, ENCODINGS) == "none":
+        return code
+    return decode_srgb(code) if encoding == "srgb" else np.maximum(code, 0.0) ** GAMMA
 
 
 def bytes_from_unit(unit: Floats) -> Bytes:
@@ -91,20 +114,16 @@ def unit_from_bytes24(codes: Bytes) -> Floats:
 def encode_rgba8(rgba: Floats, encoding: str = "srgb") -> Bytes:
     """Return straight 8-bit RGBA (..., 4) of a premultiplied working-space image.
 
-    `encoding` is "srgb" for a linear working space, or "none" to store the numbers as they are.  Alpha is
-    never encoded.
+    `encoding` is "srgb" or "gamma2.2" for a linear working space, or "none" to store the numbers as they
+    are.  Alpha is never encoded.
     """
-    one_of("encoding", encoding, ENCODINGS)
     straight = straight_from_premultiplied(rgba)
-    if encoding == "srgb":
-        straight[..., :3] = encode_srgb(straight[..., :3])
+    straight[..., :3] = encode_light(straight[..., :3], encoding)
     return bytes_from_unit(straight)
 
 
 def decode_rgba8(codes: Bytes, encoding: str = "srgb") -> Floats:
     """Return the premultiplied working-space image of straight 8-bit RGBA; undoes `encode_rgba8`."""
-    one_of("encoding", encoding, ENCODINGS)
     straight = codes / 255.0
-    if encoding == "srgb":
-        straight[..., :3] = decode_srgb(straight[..., :3])
+    straight[..., :3] = decode_light(straight[..., :3], encoding)
     return premultiplied_from_straight(straight)

@@ -8,7 +8,7 @@ from volref.arrays import Floats, Numbers, float_array, one_of
 from volref.errors import FormatError
 from volref.image import (
     ENCODINGS,
-    decode_srgb,
+    decode_light,
     encode_rgba8,
     premultiplied_from_straight,
     straight_from_premultiplied,
@@ -34,7 +34,8 @@ def read_image(
     Parameters
     ----------
     encoding
-        "srgb" or "none": how the colours are encoded.  Default "srgb" for integers, "none" for floats.
+        "srgb", "gamma2.2" or "none": how the colours are encoded.  Default "srgb" for integers,
+        "none" for floats.
     alpha
         "straight" or "premultiplied": what the file holds.  Default "straight" for integers,
         "premultiplied" for floats.  A premultiplied code is the encoded colour times alpha, as a browser's
@@ -56,8 +57,7 @@ def read_image(
     if alpha == "premultiplied" and encoding == "none":
         return rgba
     straight = straight_from_premultiplied(rgba) if alpha == "premultiplied" else rgba
-    if encoding == "srgb":
-        straight[..., :3] = decode_srgb(straight[..., :3])
+    straight[..., :3] = decode_light(straight[..., :3], encoding)
     return premultiplied_from_straight(straight)
 
 

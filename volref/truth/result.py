@@ -50,7 +50,8 @@ class Render:
     def save(self, path: str | Path, *, encoding: str = "srgb", overwrite: bool = False) -> None:
         """Write the image: .png for people, .npy the exact rgba, .npz rgba, distance and bound.
 
-        `encoding` is for PNG only: "srgb" for a linear working space, "none" to store its numbers as codes.
+        `encoding` is for PNG only: "srgb" or "gamma2.2" for a linear working space, "none" to store its
+        numbers as codes.
 
         Raises
         ------
