@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from volref.scene.camera import Camera
-from volref.stages.zbuffer import guard_band, nearest_triangles, subpixel_bits
+from volref.stages.zbuffer import all_fragments, guard_band, nearest_triangles, subpixel_bits
 
 # Seen along -z, so that vertices (x, y, depth) stand for themselves.
 PARALLEL = Camera.orthographic((0, 0, 0), (0, 0, -1), (0, 1, 0), 1.0, 0.0, 100.0)
@@ -209,3 +209,41 @@ def test_interpenetrating_planes_cross_where_their_depths_are_equal():
     image = drawn([rising, falling], 8, 8, PARALLEL)
     assert (image[:, :4] == 0).all()
     assert (image[:, 4:] == 1).all()
+
+
+def fragment_counts(triangles, width, height, camera=PARALLEL, **options):
+    """Return how often each triangle has a fragment at each pixel (height, width, T)."""
+    corners = np.asarray(triangles, dtype=np.float64)
+    x, y, depth = corners.reshape(-1, 3).T
+    w = 1.0 if camera.is_parallel else depth
+    vertices = np.stack([x * w, y * w, depth])
+    faces, source = np.arange(3 * len(corners)).reshape(-1, 3).T, np.arange(len(corners))
+    counts = np.zeros((height * width, len(corners)), int)
+    for pixel, which in all_fragments(vertices, faces, source, camera, width, height, **options):
+        np.add.at(counts, (pixel, which), 1)
+    return counts.reshape(height, width, -1)
+
+
+@pytest.mark.parametrize("batch", [1, 40, 2**15])
+def test_all_fragments_are_those_of_integer_edge_functions_once_each(batch):
+    triangles = random_triangles(seed=4, count=12, side=16)
+    counts = fragment_counts(triangles, 16, 16, batch=batch)
+    for number, triangle in enumerate(triangles):
+        np.testing.assert_array_equal(counts[..., number], covered_by_edge_functions(triangle, 16, 16))
+
+
+def test_the_nearest_of_all_fragments_is_what_the_z_buffer_keeps():
+    """All triangles are level here, so the depth of a fragment is that of its triangle."""
+    triangles = random_triangles(seed=5, count=30, side=24)
+    triangles[:, :, 2] = np.random.default_rng(6).permutation(30)[:, None] + 1.0
+    counts = fragment_counts(triangles, 24, 24)
+    depth = np.where(counts == 1, triangles[:, 0, 2], np.inf)
+    expected = np.where(counts.any(axis=2), depth.argmin(axis=2), -1)
+    np.testing.assert_array_equal(drawn(triangles, 24, 24), expected)
+
+
+def test_all_fragments_may_be_asked_for_beyond_the_far_plane():
+    triangle = [[(0, 0, 50), (30, 0, 150), (0, 30, 150)]]
+    near, all_of_it = (fragment_counts(triangle, 16, 16, far=far).sum() for far in (None, np.inf))
+    assert 0 < near < all_of_it
+    assert all_of_it == covered_by_edge_functions(triangle[0], 16, 16).sum()

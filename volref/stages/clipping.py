@@ -48,13 +48,13 @@ def project(points: Floats, camera: Camera, width: int, height: int) -> Floats:
 
 
 def clip_triangles(
-    vertices: Floats, corners: Indices, camera: Camera, band: float
+    vertices: Floats, corners: Indices, camera: Camera, band: float, far: float | None = None
 ) -> tuple[Floats, Indices, Integers]:
     """Cut triangles at the near plane and at |x|, |y| <= `band` pixels; drop those outside.
 
     Returns the vertices with the cut points appended, the corners of what is left, and for each of these
     triangles the index of the one it comes from.  A quadrilateral becomes two triangles.  Triangles wholly
-    beyond the far plane are dropped, those that cross it are kept whole.
+    beyond the far plane, or the depth `far` in its place, are dropped, those that cross it are kept whole.
 
     A cut point is always computed from the inner to the outer end of its edge.  Two triangles with a common
     edge therefore get bit-equal points, and no crack between them (Blinn and Newell 1978 clip in the same
@@ -71,7 +71,7 @@ def clip_triangles(
     >>> corners.shape, source.tolist(), float(cut[2, corners].min())
     ((3, 2), [0, 0], 1.0)
     """
-    codes = _outcodes(vertices, camera, band)
+    codes = _outcodes(vertices, camera, band, camera.far if far is None else far)
     if not codes.any():
         return vertices, corners, np.arange(corners.shape[1])
     first, second, third = codes[corners]
@@ -98,18 +98,18 @@ def _affine_row(row: Floats, point: Floats | tuple[Floats, Floats, Floats]) -> F
     return np.asarray(row[0] * x + row[1] * y + row[2] * z + row[3])
 
 
-def _inside_distances(vertices: Floats, camera: Camera, band: float) -> tuple[Floats, ...]:
+def _inside_distances(vertices: Floats, camera: Camera, band: float, far: float) -> tuple[Floats, ...]:
     """Return one array per plane, in the order of the outcode bits, at least 0 inside."""
     x_w, y_w, depth = vertices
     reach = np.full_like(depth, band) if camera.is_parallel else band * depth
-    return depth - camera.near, camera.far - depth, reach - x_w, reach + x_w, reach - y_w, reach + y_w
+    return depth - camera.near, far - depth, reach - x_w, reach + x_w, reach - y_w, reach + y_w
 
 
 def _outcodes(
-    vertices: Floats, camera: Camera, band: float
+    vertices: Floats, camera: Camera, band: float, far: float
 ) -> np.ndarray[tuple[int, ...], np.dtype[np.uint8]]:
     codes = np.zeros(vertices.shape[1], np.uint8)
-    for plane, distance in enumerate(_inside_distances(vertices, camera, band)):
+    for plane, distance in enumerate(_inside_distances(vertices, camera, band, far)):
         codes |= (distance < 0).astype(np.uint8) << np.uint8(plane)
     return codes
 
@@ -118,7 +118,7 @@ def _cut(
     triangles: Floats, source: Integers, plane: int, camera: Camera, band: float
 ) -> tuple[Floats, Integers]:
     """Cut triangles (3 coordinates, 3 corners, S) at one plane."""
-    distances = _inside_distances(triangles, camera, band)[plane]
+    distances = _inside_distances(triangles, camera, band, camera.far)[plane]
     inside = distances >= 0
     count = inside.sum(axis=0)
     parts, sources = [triangles[:, :, count == 3]], [source[count == 3]]

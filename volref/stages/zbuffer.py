@@ -1,4 +1,4 @@
-"""Stage: which triangle is nearest at each pixel centre.
+"""Stage: which triangles cover each pixel centre, and which of them is nearest.
 
 V vertices, T triangles, S spans (one triangle in one row), F fragments (one triangle at one pixel centre).
 Vertices are (3, V), rows (x w, y w, depth) as `stages.clipping` describes; pixels are flat, y * width + x.
@@ -59,6 +59,14 @@ class _Spans(NamedTuple):
         return _Spans(first, length, key, step, self.least[which], self.most[which], self.source[which])
 
 
+class _Fragments(NamedTuple):
+    """Pixel, key and source of fragments, all (F,)."""
+
+    pixel: Integers
+    key: Floats
+    source: Integers
+
+
 def subpixel_bits(width: int, height: int) -> int:
     """Return b of the grid of 2^-b pixel: 16 up to 8192 pixels, one less for each doubling of the side.
 
@@ -105,21 +113,65 @@ def nearest_triangles(
     >>> nearest_triangles(vertices, np.array([[0], [1], [2]]), np.array([7]), camera, 4, 2).tolist()
     [7, 7, 7, -1, 7, -1, -1, -1]
     """
+    nearest_key = np.full(width * height, np.inf)
+    nearest = np.full(width * height, NOTHING)
+    for spans in _all_spans(vertices, corners, source, camera, width, height, batch):
+        _merge(_expanded(spans, camera.far, camera), nearest_key, nearest)
+    nearest[nearest == NOTHING] = -1
+    return nearest
+
+
+def all_fragments(
+    vertices: Floats,
+    corners: Indices,
+    source: Integers,
+    camera: Camera,
+    width: int,
+    height: int,
+    *,
+    far: float | None = None,
+    batch: int = BATCH,
+) -> Iterator[tuple[Integers, Integers]]:
+    """Yield (pixel (F,), source (F,)) of every fragment of the triangles, in parts; see `nearest_triangles`.
+
+    `far` takes the place of the camera's far plane, beyond which there are none.  Coverage is that of the
+    z-buffer: of a mesh whose every edge has two triangles each pixel has an even number.
+
+    Examples
+    --------
+    >>> camera = Camera.orthographic((0, 0, 1), (0, 0, 0), (0, 1, 0), 2.0, 0.0, 2.0)
+    >>> vertices = np.array([[0.0, 4.0, 0.0], [0.0, 0.0, 2.0], [1.0, 1.0, 1.0]])
+    >>> corners = np.array([[0, 0], [1, 1], [2, 2]])
+    >>> fragments = all_fragments(vertices, corners, np.array([7, 8]), camera, 4, 2)
+    >>> [(pixel.tolist(), source.tolist()) for pixel, source in fragments]
+    [([0, 1, 2, 4, 0, 1, 2, 4], [7, 7, 7, 7, 8, 8, 8, 8])]
+    """
+    limit = camera.far if far is None else far
+    for spans in _all_spans(vertices, corners, source, camera, width, height, batch):
+        pixel, _, which = _expanded(spans, limit, camera)
+        yield pixel, which
+
+
+def _all_spans(
+    vertices: Floats,
+    corners: Indices,
+    source: Integers,
+    camera: Camera,
+    width: int,
+    height: int,
+    batch: int,
+) -> Iterator[_Spans]:
+    """Yield the runs of pixels of all triangles, of about `batch` pixels at a time."""
     bits = subpixel_bits(width, height)
     screen = _on_screen(vertices, camera, width, height, bits)
     live = _with_pixels(screen, corners)
-    farthest = _key(np.array([camera.far]), camera)[0]
-    nearest_key = np.full(width * height, np.inf)
-    nearest = np.full(width * height, NOTHING)
     for chunk in np.array_split(live, 1 + len(live) // batch):
         ordered = _top_down(screen, corners[:, chunk])
         rows = screen.row[ordered[2]] - screen.row[ordered[0]]
         for part in _batches(rows, batch):
             spans = _spans(screen, ordered[:, part], source[chunk[part]], width, bits)
             for some in _batches(spans.length, batch):
-                _merge(spans.part(some), farthest, nearest_key, nearest)
-    nearest[nearest == NOTHING] = -1
-    return nearest
+                yield spans.part(some)
 
 
 def _key(depth: Floats, camera: Camera) -> Floats:
@@ -242,19 +294,26 @@ def _steps(screen: _Screen, corners: Indices, key: Floats) -> tuple[Floats, Floa
     return (key1 * y2 - key2 * y1) / area, (x1 * key2 - x2 * key1) / area
 
 
-def _merge(spans: _Spans, farthest: float, nearest_key: Floats, nearest: Integers) -> None:
-    """Put the fragments of `spans` into the buffers; the order of calls does not matter."""
+def _expanded(spans: _Spans, far: float, camera: Camera) -> _Fragments:
+    """Return the fragments of `spans` up to the depth `far`."""
     span = np.repeat(np.arange(len(spans.length)), spans.length)
     offset = np.arange(len(span)) - (np.cumsum(spans.length) - spans.length)[span]
     pixel = spans.pixel[span] + offset
     # A centre may lie 2^-16 pixel outside the triangle, which is far in depth if it is nearly edge-on.
     key = np.clip(spans.key[span] + spans.step[span] * offset, spans.least[span], spans.most[span])
+    farthest = _key(np.array([far]), camera)[0]
     if spans.most.max(initial=-np.inf) > farthest:
         near = np.flatnonzero(key <= farthest)
         pixel, key, span = pixel[near], key[near], span[near]
+    return _Fragments(pixel, key, spans.source[span])
+
+
+def _merge(fragments: _Fragments, nearest_key: Floats, nearest: Integers) -> None:
+    """Put fragments into the buffers; the order of calls does not matter."""
+    pixel, key, source = fragments
     before = nearest_key[pixel]
     np.minimum.at(nearest_key, pixel, key)
     wins = np.flatnonzero(key == nearest_key[pixel])
-    pixel, source = pixel[wins], spans.source[span[wins]]
+    pixel = pixel[wins]
     nearest[pixel[key[wins] < before[wins]]] = NOTHING
-    np.minimum.at(nearest, pixel, source)
+    np.minimum.at(nearest, pixel, source[wins])
