@@ -1,4 +1,4 @@
-"""A volume that no flip or swap of axes leaves the same, places for it, and how to tell that it lies there."""
+"""A volume that no flip or swap of axes leaves the same, places for it, and how to tell that it is there."""
 
 import numpy as np
 

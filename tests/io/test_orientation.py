@@ -8,6 +8,7 @@ import metaimageio
 import numpy as np
 import pydicom
 import pytest
+import tifffile
 
 from tests.dicom_files import write_series
 from tests.letters import FLIP_LPS, FLIPS, assert_places_equal, letter_f, oblique
@@ -79,3 +80,36 @@ def test_each_voxel_of_a_dicom_series_lies_where_nibabel_puts_its_slice(tmp_path
         point = (ours.world_from_index @ [i, j, k, 1])[:3]
         # Positions are texts of 16 characters: 11 digits behind the point here.
         assert placed[tuple(np.round(point, 6) + 0.0)] == ours.values[k, j, i]
+
+
+SPACING = (0.7, 1.3, 5.0)
+PLACE = {"axes": "ZYX"} | {f"PhysicalSize{axis}": step for axis, step in zip("XYZ", SPACING, strict=True)}
+
+
+def write_imagej(path, **more):
+    text = {"axes": "ZYX", "spacing": 5.0, "unit": "um"}
+    tifffile.imwrite(
+        path, letter_f(np.uint16), imagej=True, resolution=(1 / 0.7, 1 / 1.3), metadata=text, **more
+    )
+
+
+def write_ome(path, **more):
+    tifffile.imwrite(path, letter_f(), ome=True, photometric="minisblack", metadata=PLACE, **more)
+
+
+@pytest.mark.parametrize("write", [write_imagej, write_ome])
+@pytest.mark.parametrize("more", [{}, {"compression": "zlib"}, {"byteorder": ">"}])
+def test_a_tiff_stack_has_the_axes_and_the_spacing_of_its_text(tmp_path, write, more):
+    write(tmp_path / "f.tif", **more)
+    volume = load_volume(tmp_path / "f.tif")
+    assert_places_equal(volume, np.diag([*volume.spacing, 1.0]), tifffile.imread(tmp_path / "f.tif"))
+    assert np.array_equal(volume.values, letter_f())
+    # ImageJ writes x and y as quotients of 32-bit numbers, pixels per unit.
+    assert volume.spacing == pytest.approx(SPACING, rel=1e-9)
+
+
+def test_a_plain_tiff_stack_takes_the_spacing_that_is_stated(tmp_path):
+    tifffile.imwrite(tmp_path / "f.tif", letter_f(), photometric="minisblack", metadata=None)
+    volume = load_volume(tmp_path / "f.tif", spacing=SPACING)
+    assert np.array_equal(volume.values, tifffile.imread(tmp_path / "f.tif"))
+    assert volume.spacing == SPACING

@@ -9,6 +9,7 @@ import difflib
 import importlib
 import json
 import math
+import zlib
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path, PureWindowsPath
@@ -28,6 +29,8 @@ LARGEST_JSON_BYTES = 2**28
 # (zlib, "Technical Details": the limit is 1032 to 1).
 DEFLATE_RATIO = 1032
 DEFLATE_SLACK = 2**16
+# What a chunk may have beyond the samples: files of a few voxels are stored in chunks of usual sizes.
+CHUNK_SLACK = 2**25
 
 
 def existing_file(path: str | Path) -> Path:
@@ -145,6 +148,41 @@ def check_deflated(file: Path, needed: int, compressed: int, what: str) -> None:
         f"{file.name} must hold {needed} bytes ({what}), got {compressed} compressed bytes, which cannot; "
     )
     raise FormatError(message + "write the file again")
+
+
+def check_inflated(file: Path, data: bytes, most: int, what: str) -> None:
+    """Refuse a zlib or gzip stream that unpacks to more than `most` bytes; nothing of it is kept.
+
+    For libraries that unpack a whole stream before they look at its length.
+
+    Raises
+    ------
+    FormatError
+        If it unpacks to more.
+    """
+    stream, length = zlib.decompressobj(47), 0
+    while data and not stream.eof:
+        length += len(stream.decompress(data, 2**20))
+        data = stream.unconsumed_tail
+        if length > most:
+            message = f"{file.name} must unpack to at most {most} bytes at once ({what}), got more; "
+            raise FormatError(message + "write the file again")
+
+
+def check_chunk(file: Path, chunk: int, needed: int) -> None:
+    """Refuse chunks (tiles, strips) that would take far more memory to unpack than all samples together.
+
+    Raises
+    ------
+    FormatError
+        If a chunk has more bytes than that.
+    """
+    if chunk <= 2 * needed + CHUNK_SLACK:
+        return
+    message = (
+        f"{file.name} must be stored in chunks of the size of its {spell_bytes(needed)} of samples, got "
+    )
+    raise FormatError(message + f"chunks of {spell_bytes(chunk)}; write the file again")
 
 
 @contextmanager

@@ -22,6 +22,7 @@ from volref.io.nrrd import is_detached as is_detached_nrrd
 from volref.io.nrrd import read_nrrd
 from volref.io.placement import GEOMETRY, SIGNS, placement_of_affine
 from volref.io.raw import read_raw
+from volref.io.tiff import read_tiff
 
 Statement: TypeAlias = dict[str, Any]
 Found: TypeAlias = tuple[Numbers, Statement]
@@ -148,6 +149,10 @@ def _read_dicom(file: Path, own: Statement, max_bytes: int) -> Found:
     return read_dicom(file, own.get("key"), max_bytes)
 
 
+def _read_tiff(file: Path, _: Statement, max_bytes: int) -> Found:
+    return read_tiff(file, max_bytes)
+
+
 def _never(_: Path) -> bool:
     return False
 
@@ -157,6 +162,7 @@ _NIFTI = Reader("NIfTI", _read_nifti)
 _RAW = Reader("RAW", _read_raw, RAW_KEYS[:4], RAW_KEYS)
 _MHA = Reader("MetaImage", _read_mha, placed=False, alone=lambda file: not is_detached_mha(file))
 _DICOM = Reader("DICOM", _read_dicom, ("key",), alone=_never)
+_TIFF = Reader("TIFF", _read_tiff, placed=False)
 
 READERS = {
     ".npy": Reader(".npy", _read_npy),
@@ -168,6 +174,8 @@ READERS = {
     ".mha": _MHA,
     ".mhd": _MHA,
     ".dcm": _DICOM,
+    ".tif": _TIFF,
+    ".tiff": _TIFF,
     ".raw": _RAW,
     ".bin": _RAW,
     ".png": Reader("PNG atlas", _read_atlas, ATLAS_KEYS, ATLAS_NEEDED),

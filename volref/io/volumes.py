@@ -40,6 +40,7 @@ def load_volume(
     .mha .mhd               MetaImage
     .dcm, a folder          DICOM series (extra `dicom`): a folder of slices, or one of them; of several
                             series the one whose SeriesInstanceUID is `key`
+    .tif .tiff              TIFF stack (extra `tiff`); spacing from ImageJ's or OME's text, else stated
     .raw .bin               needs size, dtype, byte_order, skip and spacing, see `load_raw`
     .png                    slice atlas, needs tiles_across, tiles_down and slices, see `volref.io.atlas`
     ======================  ==============================================================================
