@@ -10,15 +10,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from volref.cubics import evaluate, value_range
 from volref.records import Pieces
 from volref.stages.splitting import (
     LEAST_PART,
-    evaluate,
     part,
     split_at_bends,
     split_evenly,
     split_geometrically,
-    value_range,
 )
 
 U = Fraction(1, 2**53)

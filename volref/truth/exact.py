@@ -16,20 +16,22 @@ from itertools import pairwise
 import numpy as np
 
 from volref.arrays import Booleans, Floats, Indices
+from volref.cubics import value_range
 from volref.planning import Plan, may_be_seen
 from volref.records import Pieces, Spans
 from volref.scene.blocks import flag_blocks
 from volref.scene.scene import Scene
 from volref.scene.transform import transform_directions, transform_points
 from volref.scene.volume import Volume
-from volref.stages.cells import CellGrid, cells_along, position_error, recentred
+from volref.stages.cells import CellGrid, cells_along, position_error
 from volref.stages.models import FEW_BENDS, Models, look_up, models_of, piece_of
-from volref.stages.radiance import ROUNDOFF, Gathered, gathered
+from volref.stages.radiance import Gathered, gathered
 from volref.stages.rays import pixel_rays
 from volref.stages.sampling import PAD, Grid, cell_corners, grid_of, trilinear
 from volref.stages.spans import box_spans, cut_spans
-from volref.stages.splitting import split_at_bends, split_evenly, split_geometrically, value_range
+from volref.stages.splitting import split_at_bends, split_evenly, split_geometrically
 from volref.truth.modelling import Solved, modelled
+from volref.truth.recentring import recentred_spans
 from volref.workspace import Workspace
 
 MOST_PASSES = 40
@@ -114,64 +116,12 @@ def integrate_pixels(
     origins = transform_points(prepared.index_from_world, rays.origins).T
     directions = transform_directions(prepared.index_from_world, rays.directions).T
     spans = cut_spans(box_spans(origins, directions, prepared.low, prepared.high), begin, distance)
-    origins, rests, spans, ends = _recentred(prepared, origins, directions, spans, begin, distance)
+    origins, rests, spans, ends = recentred_spans(
+        prepared.low, prepared.high, origins, directions, spans, begin, distance
+    )
     done = integrate(prepared, origins, rests, directions, spans, behind, tolerance)
     done.bound[:] += _error_of_ends(prepared, origins, directions, spans, ends, behind, done)
     return done
-
-
-def _recentred(
-    prepared: Prepared,
-    origins: Floats,
-    directions: Floats,
-    spans: Spans,
-    begin: Floats | float,
-    distance: Floats,
-) -> tuple[Floats, Floats, Spans, Spans]:
-    """Return padded origins in the middle of the spans, their rests, the spans from there, and their errors.
-
-    The ends of the spans are computed afresh but for one where the ray begins, or at a surface.  The distance
-    of a face, (face - o) / d, is off by 3 u of itself with u the unit roundoff, and by the rest of the origin
-    over d.
-    """
-    moved, rests, kept = recentred(origins, directions, spans, PAD)  # empty spans keep their origins
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        faces = [(face[:, None] + PAD - moved) / directions for face in (prepared.low, prepared.high)]
-        errors = np.abs(rests / directions)
-    parallel = directions == 0
-    errors[parallel] = 0.0
-    near = np.where(parallel, -np.inf, np.minimum(*faces))
-    far = np.where(parallel, np.inf, np.maximum(*faces))
-    near_axis, far_axis = near.argmax(axis=0)[None], far.argmin(axis=0)[None]
-    at_near, at_far = (np.take_along_axis(errors, axis, axis=0)[0] for axis in (near_axis, far_axis))
-    near, far = near.max(axis=0), far.min(axis=0)
-    inside = spans.t_far > spans.t_near
-    at_near += 3 * ROUNDOFF * np.abs(near)
-    at_far += 3 * ROUNDOFF * np.abs(far)
-    # Where a ray begins, and a surface, are what they are, unless rounding alone puts them before a face.
-    at_face = spans.t_near > begin, spans.t_far < distance
-    at_near[~(inside & (at_face[0] | (near + at_near > kept.t_near)))] = 0.0
-    at_far[~(inside & (at_face[1] | (far - at_far < kept.t_far)))] = 0.0
-    near, far = (
-        np.where(inside & at_face[0], near, kept.t_near),
-        np.where(inside & at_face[1], far, kept.t_far),
-    )
-    near, at_near = _touching(spans, at_face, near, at_near)
-    return moved, rests, Spans(near, np.maximum(near, far)), Spans(at_near, at_far)
-
-
-def _touching(
-    spans: Spans, at_face: tuple[Booleans, Booleans], near: Floats, at_near: Floats
-) -> tuple[Floats, Floats]:
-    """Return near and its error with those of rays that touch the box, although their span is empty.
-
-    Their chord is at most what rounding may have taken off it.
-    """
-    with np.errstate(invalid="ignore"):
-        chord = spans.t_far - spans.t_near
-        chord += 3 * ROUNDOFF * (at_face[0] * np.abs(spans.t_near) + at_face[1] * np.abs(spans.t_far))
-    touching = (spans.t_far <= spans.t_near) & np.isfinite(spans.t_near) & (chord >= 0)
-    return np.where(touching, spans.t_near, near), np.where(touching, chord, at_near)
 
 
 def _error_of_ends(
