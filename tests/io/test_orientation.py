@@ -4,6 +4,7 @@ The volume is a letter F of unequal slices; the places are oblique, anisotropic 
 NRRD and NIfTI are held in the same way in test_volumes.py.
 """
 
+import h5py
 import metaimageio
 import numpy as np
 import pydicom
@@ -13,6 +14,7 @@ import tifffile
 from tests.dicom_files import write_series
 from tests.letters import FLIP_LPS, FLIPS, assert_places_equal, letter_f, oblique
 from volref.io import load_volume, save_volume
+from volref.scene import Volume
 
 LPS = np.diag([-1.0, -1.0, 1.0, 1.0])
 
@@ -113,3 +115,36 @@ def test_a_plain_tiff_stack_takes_the_spacing_that_is_stated(tmp_path):
     volume = load_volume(tmp_path / "f.tif", spacing=SPACING)
     assert np.array_equal(volume.values, tifffile.imread(tmp_path / "f.tif"))
     assert volume.spacing == SPACING
+
+
+@pytest.mark.parametrize("flips", FLIPS)
+def test_h5py_reads_what_save_volume_writes(tmp_path, flips):
+    affine = oblique(flips=flips)
+    place = {"spacing": SPACING, "origin": affine[:3, 3], "direction": affine[:3, :3] / SPACING}
+    ours = Volume(letter_f(), **place, centering="node")
+    save_volume(ours, tmp_path / "f.h5")
+    with h5py.File(tmp_path / "f.h5") as archive:
+        said = archive["volume"].attrs
+        assert_places_equal(ours, affine, archive["volume"][()])
+        assert_places_equal(load_volume(tmp_path / "f.h5"), affine, archive["volume"][()])
+        assert np.array_equal(said["direction"], ours.direction)
+    assert load_volume(tmp_path / "f.h5").centering == "node"
+    assert np.array_equal(load_volume(tmp_path / "f.h5").world_from_index, ours.world_from_index)
+
+
+GZIP = {"compression": "gzip", "shuffle": True, "fletcher32": True}
+
+
+@pytest.mark.parametrize("name", ["element_size_um", "spacing_zyx"])
+@pytest.mark.parametrize(
+    "more", [{}, {"compression": "gzip", "shuffle": True, "fletcher32": True}, {"chunks": True}]
+)
+def test_a_dataset_of_hdf5_has_its_spacing_from_z_to_x(tmp_path, name, more):
+    with h5py.File(tmp_path / "f.h5", "w") as archive:
+        archive.create_dataset("a/f", data=letter_f(), **more).attrs[name] = SPACING[::-1]
+        archive["a/list"] = np.arange(3)
+        archive["label"] = np.zeros((2, 2, 2), np.uint8)
+        archive["text"] = "x"
+    volume = load_volume(tmp_path / "f.h5", key="a/f")
+    assert volume.spacing == SPACING
+    assert np.array_equal(volume.values, letter_f())

@@ -11,6 +11,7 @@ from volref.errors import FormatError
 from volref.io.atlas import AtlasLayout, square_layout, write_atlas
 from volref.io.atomic import check_free, write_text
 from volref.io.guard import DEFAULT_MAX_BYTES, nearest, one_line
+from volref.io.hdf5 import write_hdf5
 from volref.io.mha import write_mha
 from volref.io.nifti import write_nifti
 from volref.io.npy import write_npy, write_npz
@@ -48,12 +49,12 @@ def convert_volume(
 def save_volume(
     volume: Volume, path: str | Path, *, overwrite: bool = False, layout: AtlasLayout | None = None
 ) -> None:
-    """Write a volume as .npy, .npz, .nrrd, .nii, .nii.gz, .mha, .raw or a .png atlas.
+    """Write a volume as .npy, .npz, .nrrd, .nii, .nii.gz, .mha, .h5, .raw or a .png atlas.
 
     Values are never changed.  Where the format has no place for the geometry (.npy, .raw, .png) it stands in
     a JSON file beside the data, `<name>.json`, which `load_volume` reads; the other formats leave none, and
-    with `overwrite` an old one is removed.  Geometry comes back bit for bit from .npy, .npz, .raw and .png,
-    to rounding from .nrrd, and to float32 from NIfTI.
+    with `overwrite` an old one is removed.  Geometry comes back bit for bit from .npy, .npz, .h5, .raw and
+    .png, to rounding from .nrrd and .mha, and to float32 from NIfTI.
 
     Parameters
     ----------
@@ -116,6 +117,11 @@ def _write_mha(file: Path, volume: Volume, options: _Options) -> _Statement:
     return None
 
 
+def _write_hdf5(file: Path, volume: Volume, options: _Options) -> _Statement:
+    write_hdf5(file, volume, overwrite=options.overwrite)
+    return None
+
+
 def _write_raw(file: Path, volume: Volume, options: _Options) -> _Statement:
     return write_raw(file, volume.values, overwrite=options.overwrite)
 
@@ -133,6 +139,8 @@ _WRITERS: dict[str, Callable[[Path, Volume, _Options], _Statement]] = {
     ".nii": _write_nifti,
     ".nii.gz": _write_nifti,
     ".mha": _write_mha,
+    ".h5": _write_hdf5,
+    ".hdf5": _write_hdf5,
     ".raw": _write_raw,
     ".png": _write_atlas,
 }

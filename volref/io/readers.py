@@ -13,14 +13,15 @@ from volref.arrays import Numbers
 from volref.errors import FormatError
 from volref.io.atlas import AtlasLayout, read_atlas
 from volref.io.dicom import read_dicom
-from volref.io.guard import one_line, wrapped
+from volref.io.guard import one_line
+from volref.io.hdf5 import read_hdf5
 from volref.io.mha import is_detached as is_detached_mha
 from volref.io.mha import read_mha
 from volref.io.nifti import read_nifti
 from volref.io.npy import chosen_array, npz_headers, read_npy, read_npz
 from volref.io.nrrd import is_detached as is_detached_nrrd
 from volref.io.nrrd import read_nrrd
-from volref.io.placement import GEOMETRY, SIGNS, placement_of_affine
+from volref.io.placement import GEOMETRY, SIGNS, joined_places, placement_of_affine
 from volref.io.raw import read_raw
 from volref.io.tiff import read_tiff
 
@@ -103,26 +104,7 @@ def _read_npz(file: Path, own: Statement, max_bytes: int) -> Found:
                 message = f"{file.name} must hold {key} as 4 x 4 numbers, got {affine.dtype} of shape "
                 raise FormatError(message + f"{affine.shape}; save a matrix from (i, j, k) to the world")
             places[key] = placement_of_affine(affine, SIGNS[space])
-    return values, _joined(file, places)
-
-
-def _joined(file: Path, places: dict[str, Statement]) -> Statement:
-    """Return what several arrays say of one place, the last (a matrix) as it is, if they do not differ."""
-    joined: Statement = {}
-    for name, said in places.items():
-        for key in joined.keys() & said.keys():
-            with wrapped(file, ".npz file"):
-                first, second = (np.asarray(value, dtype=np.float64) for value in (joined[key], said[key]))
-                # 1e-4: a number beside a matrix may be rounded to 5 digits.
-                same = first.shape == second.shape and bool(
-                    (np.abs(first - second) <= 1e-4 * np.abs(second).max()).all()
-                )
-            if not same:
-                message = f"{file.name} must state its {key} once, got {one_line(str(joined[key]))} and, by "
-                message += f"{name}, {one_line(str(said[key]))}; "
-                raise FormatError(message + "remove the array that is wrong")
-        joined |= said
-    return joined
+    return values, joined_places(file, places)
 
 
 def _read_nrrd(file: Path, _: Statement, max_bytes: int) -> Found:
@@ -153,6 +135,10 @@ def _read_tiff(file: Path, _: Statement, max_bytes: int) -> Found:
     return read_tiff(file, max_bytes)
 
 
+def _read_hdf5(file: Path, own: Statement, max_bytes: int) -> Found:
+    return read_hdf5(file, own.get("key"), max_bytes)
+
+
 def _never(_: Path) -> bool:
     return False
 
@@ -163,6 +149,7 @@ _RAW = Reader("RAW", _read_raw, RAW_KEYS[:4], RAW_KEYS)
 _MHA = Reader("MetaImage", _read_mha, placed=False, alone=lambda file: not is_detached_mha(file))
 _DICOM = Reader("DICOM", _read_dicom, ("key",), alone=_never)
 _TIFF = Reader("TIFF", _read_tiff, placed=False)
+_HDF5 = Reader("HDF5", _read_hdf5, ("key",), placed=False)
 
 READERS = {
     ".npy": Reader(".npy", _read_npy),
@@ -176,6 +163,8 @@ READERS = {
     ".dcm": _DICOM,
     ".tif": _TIFF,
     ".tiff": _TIFF,
+    ".h5": _HDF5,
+    ".hdf5": _HDF5,
     ".raw": _RAW,
     ".bin": _RAW,
     ".png": Reader("PNG atlas", _read_atlas, ATLAS_KEYS, ATLAS_NEEDED),

@@ -41,6 +41,8 @@ def load_volume(
     .dcm, a folder          DICOM series (extra `dicom`): a folder of slices, or one of them; of several
                             series the one whose SeriesInstanceUID is `key`
     .tif .tiff              TIFF stack (extra `tiff`); spacing from ImageJ's or OME's text, else stated
+    .h5 .hdf5               HDF5 (extra `hdf5`): the dataset `key` or the only one with 3 axes; attributes
+                            "spacing", "origin", "direction", "centering", "spacing_zyx" or "element_size_um"
     .raw .bin               needs size, dtype, byte_order, skip and spacing, see `load_raw`
     .png                    slice atlas, needs tiles_across, tiles_down and slices, see `volref.io.atlas`
     ======================  ==============================================================================
