@@ -57,6 +57,7 @@ if TYPE_CHECKING:
     from volref.tonemap import tone_map
     from volref.truth.rendering import render
     from volref.truth.result import Render
+    from volref.truth.supersampling import supersample
     from volref.truth.tracing import Trace, trace
     from volref.truth.verification import Verification, verify
 
@@ -104,6 +105,7 @@ __all__ = [
     "save_transfer",
     "save_volume",
     "scene_schema",
+    "supersample",
     "tone_map",
     "trace",
     "verify",
@@ -132,6 +134,7 @@ _HOMES = {
     "volref.scene.arcball": ("arcball_rotation", "drag"),
     "volref.tonemap": ("tone_map",),
     "volref.truth.rendering": ("render",),
+    "volref.truth.supersampling": ("supersample",),
     "volref.truth.result": ("Render",),
     "volref.truth.tracing": ("Trace", "trace"),
     "volref.truth.verification": ("Verification", "verify"),
