@@ -2,9 +2,11 @@
 
 import argparse
 import math
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from volref.cli.display import add_display, check_display, save
 from volref.cli.machines import add_dask, executor_at
 from volref.cli.options import (
     accuracy,
@@ -47,11 +49,18 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         help="begin nothing more after S seconds; what is not finished then has a larger error, and says so",
     )
     parser.add_argument(
+        "--supersample",
+        type=int,
+        metavar="N",
+        help="make each pixel the mean of N x N rays; the error is that of their mean",
+    )
+    parser.add_argument(
         "--verify",
         type=int,
         metavar="N",
         help="integrate N random rays again at 30 digits, by another path, and compare (extra 'verify')",
     )
+    add_display(parser)
     add_work(parser)
     add_dask(parser)
     add_force(parser)
@@ -59,13 +68,18 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _run(options: argparse.Namespace) -> int:
-    from volref import render
+    from volref import render, supersample
 
     targets = [Path(name) for name in options.output]
     _check_targets(targets, force=options.force)
+    check_display(options)
+    if options.supersample is not None and options.verify is not None:
+        message = "--verify must be given without --supersample, whose pixels are no single rays, got both; "
+        raise FormatError(message + "leave one out")
     scene = read_scene(options)
+    draw = render if options.supersample is None else partial(supersample, factor=options.supersample)
     with executor_at(options.dask) as executor, progress("render", quiet=options.quiet) as show:
-        out = render(
+        out = draw(
             scene,
             threads=options.threads,
             executor=executor,
@@ -74,7 +88,7 @@ def _run(options: argparse.Namespace) -> int:
             **accuracy(options),
         )
     for target in targets:
-        out.save(target, overwrite=options.force)
+        save(out, target, options)
     checked = None if options.verify is None else _verified(scene, out, options)
     if options.json:
         print_json(_figures(out, options.output) | ({"verification": checked.as_dict()} if checked else {}))
@@ -166,6 +180,8 @@ VERB = Verb(
         ("render scene.json -o fine.npy --tolerance 1e-9", "a stricter tolerance"),
         ("render scene.json -o quick.png --max-seconds 5", "what can be certified in five seconds"),
         ("render scene.json -o look.png --step 1 --tolerance 1", "a quick march, its error estimated"),
+        ("render scene.json -o smooth.png --supersample 4", "each pixel the mean of 4 x 4 rays"),
+        ("render scene.json -o bright.png --tone-map hable --exposure 4", "strong light, filmed"),
         ("render scene.json -o image.npy --dask local:4", "with four processes of this machine"),
         ("render scene.json -o image.npy --verify 64", "with 64 of its rays checked at 30 digits"),
     ),
