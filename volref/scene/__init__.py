@@ -6,6 +6,7 @@ from volref.scene.mesh import Mesh
 from volref.scene.plane import Plane, clip_box
 from volref.scene.radar import RadarVolume
 from volref.scene.scene import Scene
+from volref.scene.series import Series
 from volref.scene.sweep import Sweep
 from volref.scene.transfer import TransferFunction
 from volref.scene.transfer2d import TransferFunction2D
@@ -19,6 +20,7 @@ __all__ = [
     "Plane",
     "RadarVolume",
     "Scene",
+    "Series",
     "Sweep",
     "TransferFunction",
     "TransferFunction2D",
