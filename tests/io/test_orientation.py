@@ -4,12 +4,16 @@ The volume is a letter F of unequal slices; the places are oblique, anisotropic 
 NRRD and NIfTI are held in the same way in test_volumes.py.
 """
 
+import zipfile
+
 import h5py
 import metaimageio
+import numcodecs
 import numpy as np
 import pydicom
 import pytest
 import tifffile
+import zarr
 
 from tests.dicom_files import write_series
 from tests.letters import FLIP_LPS, FLIPS, assert_places_equal, letter_f, oblique
@@ -148,3 +152,67 @@ def test_a_dataset_of_hdf5_has_its_spacing_from_z_to_x(tmp_path, name, more):
     volume = load_volume(tmp_path / "f.h5", key="a/f")
     assert volume.spacing == SPACING
     assert np.array_equal(volume.values, letter_f())
+
+
+GZIP_CODEC = {2: numcodecs.GZip(), 3: zarr.codecs.GzipCodec()}
+BLOSC_CODEC = {2: numcodecs.Blosc(), 3: zarr.codecs.BloscCodec()}
+
+
+@pytest.mark.parametrize("form", [2, 3])
+@pytest.mark.parametrize("compressors", [None, "auto", GZIP_CODEC, BLOSC_CODEC])
+def test_a_zarr_array_has_its_axes_in_order(tmp_path, form, compressors):
+    if compressors not in (None, "auto"):
+        compressors = compressors[form]
+    zarr.create_array(
+        tmp_path / "f.zarr", data=letter_f(), chunks=(2, 3, 4), zarr_format=form, compressors=compressors
+    )
+    volume = load_volume(tmp_path / "f.zarr", spacing=SPACING)
+    assert_places_equal(volume, np.diag([*SPACING, 1.0]), zarr.open_array(tmp_path / "f.zarr", mode="r")[:])
+
+
+def test_a_zarr_array_with_named_axes_is_turned_to_z_first(tmp_path):
+    zarr.create_array(tmp_path / "f.zarr", data=letter_f().T.copy(), dimension_names=("x", "y", "z"))
+    assert np.array_equal(load_volume(tmp_path / "f.zarr", spacing=SPACING).values, letter_f())
+
+
+def test_a_sharded_zarr_array_is_read(tmp_path):
+    zarr.create_array(tmp_path / "f.zarr", data=letter_f(), chunks=(2, 3, 5), shards=(4, 6, 5))
+    assert np.array_equal(load_volume(tmp_path / "f.zarr", spacing=SPACING).values, letter_f())
+
+
+def write_ome_zarr(store, form, values):
+    """Write a pyramid of two levels, the second of every other sample, with axes t, c, z, y, x."""
+    group = zarr.open_group(store, mode="w", zarr_format=form)
+    datasets = []
+    for level, step in enumerate((1, 2)):
+        group.create_array(str(level), data=values[:, :, ::step, ::step, ::step])
+        scale = {"type": "scale", "scale": [1, 1, *(step * np.array(SPACING[::-1]))]}
+        shift = {"type": "translation", "translation": [0, 0, 3.0, -2.0, 10.0]}
+        datasets.append({"path": str(level), "coordinateTransformations": [scale, shift]})
+    axes = [{"name": "t", "type": "time"}, {"name": "c", "type": "channel"}]
+    axes += [{"name": name, "type": "space", "unit": "micrometer"} for name in "zyx"]
+    whole = [{"type": "scale", "scale": [1, 1, 2, 2, 2]}]
+    image = [{"axes": axes, "datasets": datasets, "coordinateTransformations": whole}]
+    if form == 2:
+        group.attrs["multiscales"] = image
+    else:
+        group.attrs["ome"] = {"version": "0.5", "multiscales": image}
+
+
+@pytest.mark.parametrize("form", [2, 3])
+@pytest.mark.parametrize("level", [0, 1])
+@pytest.mark.parametrize("name", ["f.zarr", "f.zarr.zip"])
+def test_each_voxel_of_an_ome_zarr_level_lies_where_its_transformations_put_it(tmp_path, form, level, name):
+    """Worked by hand: scale, then translation, then the scale 2 of the whole image."""
+    values = np.stack([letter_f(), 2 * letter_f()])[:, None]
+    write_ome_zarr(tmp_path / "f.zarr", form, values)
+    if name.endswith("zip"):
+        with zipfile.ZipFile(tmp_path / name, "w") as archive:
+            for file in (tmp_path / "f.zarr").rglob("*"):
+                archive.write(file, file.relative_to(tmp_path / "f.zarr"))
+    step = 2**level
+    affine = np.diag([*(2 * step * np.array(SPACING)), 1.0])
+    affine[:3, 3] = (20, -4, 6)
+    for time in (0, 1):
+        volume = load_volume(tmp_path / name, level=level, index=[time, 0])
+        assert_places_equal(volume, affine, values[time, 0, ::step, ::step, ::step])

@@ -24,6 +24,8 @@ from volref.io.nrrd import read_nrrd
 from volref.io.placement import GEOMETRY, SIGNS, joined_places, placement_of_affine
 from volref.io.raw import read_raw
 from volref.io.tiff import read_tiff
+from volref.io.zarr import METADATA as ZARR_METADATA
+from volref.io.zarr import read_zarr
 
 Statement: TypeAlias = dict[str, Any]
 Found: TypeAlias = tuple[Numbers, Statement]
@@ -36,7 +38,7 @@ AFFINES = {"affine_ijk_to_ras_mm": "ras", "affine_ijk_to_lps_mm": "lps"}
 
 
 # Suffixes of two parts.
-DOUBLE_SUFFIXES = (".nii.gz",)
+DOUBLE_SUFFIXES = (".nii.gz", ".zarr.zip")
 
 
 class Reader(NamedTuple):
@@ -62,7 +64,9 @@ def reader_of(path: Path) -> Reader:
     FormatError
         If there is none.
     """
-    reader = _DICOM if path.is_dir() else READERS.get(suffix_of(path))
+    if path.is_dir():
+        return _ZARR if any((path / name).is_file() for name in ZARR_METADATA) else _DICOM
+    reader = READERS.get(suffix_of(path))
     if reader is not None:
         return reader
     message = f"{one_line(path.name)} must end in {', '.join(READERS)}, got {path.suffix!r}; "
@@ -139,6 +143,10 @@ def _read_hdf5(file: Path, own: Statement, max_bytes: int) -> Found:
     return read_hdf5(file, own.get("key"), max_bytes)
 
 
+def _read_zarr(file: Path, own: Statement, max_bytes: int) -> Found:
+    return read_zarr(file, own.get("key"), own.get("level"), own.get("index"), max_bytes)
+
+
 def _never(_: Path) -> bool:
     return False
 
@@ -150,6 +158,7 @@ _MHA = Reader("MetaImage", _read_mha, placed=False, alone=lambda file: not is_de
 _DICOM = Reader("DICOM", _read_dicom, ("key",), alone=_never)
 _TIFF = Reader("TIFF", _read_tiff, placed=False)
 _HDF5 = Reader("HDF5", _read_hdf5, ("key",), placed=False)
+_ZARR = Reader("Zarr", _read_zarr, ("key", "level", "index"), placed=False)
 
 READERS = {
     ".npy": Reader(".npy", _read_npy),
@@ -165,6 +174,8 @@ READERS = {
     ".tiff": _TIFF,
     ".h5": _HDF5,
     ".hdf5": _HDF5,
+    ".zarr": _ZARR,
+    ".zarr.zip": _ZARR,
     ".raw": _RAW,
     ".bin": _RAW,
     ".png": Reader("PNG atlas", _read_atlas, ATLAS_KEYS, ATLAS_NEEDED),

@@ -43,6 +43,8 @@ def load_volume(
     .tif .tiff              TIFF stack (extra `tiff`); spacing from ImageJ's or OME's text, else stated
     .h5 .hdf5               HDF5 (extra `hdf5`): the dataset `key` or the only one with 3 axes; attributes
                             "spacing", "origin", "direction", "centering", "spacing_zyx" or "element_size_um"
+    .zarr .zarr.zip         Zarr (extra `zarr`): the array `key` of a group, or its only one with 3 axes; of
+                            an OME-Zarr image the array `level` (0), `index` of its axes t and c
     .raw .bin               needs size, dtype, byte_order, skip and spacing, see `load_raw`
     .png                    slice atlas, needs tiles_across, tiles_down and slices, see `volref.io.atlas`
     ======================  ==============================================================================
