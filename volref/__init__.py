@@ -25,6 +25,7 @@ if TYPE_CHECKING:
         load_mesh,
         load_meshes,
         load_preset,
+        load_radar,
         load_raw,
         load_scene,
         load_transfer,
@@ -32,10 +33,12 @@ if TYPE_CHECKING:
         read_image,
         save_camera,
         save_mesh,
+        save_radar,
         save_scene,
         save_transfer,
         save_volume,
         scene_schema,
+        write_animation,
         write_image,
     )
     from volref.oracle.metrics import Comparison, compare
@@ -96,6 +99,7 @@ __all__ = [
     "load_mesh",
     "load_meshes",
     "load_preset",
+    "load_radar",
     "load_raw",
     "load_scene",
     "load_transfer",
@@ -105,6 +109,7 @@ __all__ = [
     "render",
     "save_camera",
     "save_mesh",
+    "save_radar",
     "save_scene",
     "save_transfer",
     "save_volume",
@@ -113,6 +118,7 @@ __all__ = [
     "tone_map",
     "trace",
     "verify",
+    "write_animation",
     "write_image",
 ]
 
