@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from volref.arrays import Floats, Indices, Integers
+from volref.arrays import Booleans, Floats, Indices, Integers
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,13 +33,50 @@ class Surface:
     distance (H, W): world distance from the ray's origin, +inf where there is none.
     color (H, W, 3): its working-space colour, 0 where there is none.
     mesh (H, W): index of the mesh in the scene, -1 where there is none.
-    face (H, W): index of the triangle in that mesh's `faces`, -1 where there is none.
+    face (H, W): index of the triangle in that mesh's `faces`, -1 where there is none, or where a clipping
+    plane cuts through the inside of the mesh.
     """
 
     distance: Floats
     color: Floats
     mesh: Integers
     face: Integers
+
+
+@dataclass(frozen=True, eq=False)
+class Layers:
+    """The transparent surfaces before the opaque one: L layers, pixel after pixel, front to back in each.
+
+    starts (R + 1,): the layers of pixel r are those from starts[r] to starts[r + 1].
+    distance (L,), straight working-space color (L, 3), opacity (L,), and mesh and face (L,) as in `Surface`.
+    Layers at one distance are in the order of (mesh, face).
+    """
+
+    starts: Indices
+    distance: Floats
+    color: Floats
+    opacity: Floats
+    mesh: Integers
+    face: Integers
+
+    @property
+    def counts(self) -> Indices:
+        """How many layers each pixel has (R,)."""
+        return np.diff(self.starts)
+
+    def of_pixels(self, pixels: Indices) -> "Layers":
+        """Return the layers of some pixels, in their order."""
+        counts = self.counts[pixels]
+        starts = np.append(0, np.cumsum(counts)).astype(np.intp)
+        where = np.arange(starts[-1]) + np.repeat(self.starts[pixels] - starts[:-1], counts)
+        return Layers(
+            starts,
+            self.distance[where],
+            self.color[where],
+            self.opacity[where],
+            self.mesh[where],
+            self.face[where],
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,3 +135,16 @@ class Pieces:
             np.append(self.row, more.row),
             np.append(self.edge, more.edge),
         )
+
+
+def first_of_each(ray: Indices) -> Indices:
+    """Return the index of the first piece of each ray that has any; `ray` (n,) does not fall.
+
+    Examples
+    --------
+    >>> first_of_each(np.array([0, 0, 3, 3, 3, 4])).tolist()
+    [0, 2, 5]
+    """
+    begins: Booleans = np.ones(len(ray), np.bool_)
+    np.not_equal(ray[1:], ray[:-1], out=begins[1:])
+    return np.flatnonzero(begins)

@@ -13,7 +13,8 @@ from tests.oracles.meshes import bumpy_sphere
 from volref.scene.camera import Camera
 from volref.scene.scene import Scene
 from volref.stages.clipping import project
-from volref.truth.surfaces import nearest_faces, visible_surface
+from volref.truth.surfaces import visible_surface
+from volref.truth.triangles import nearest_faces, triangles_of
 
 WIDTH = HEIGHT = 512
 
@@ -42,7 +43,9 @@ def main() -> None:
         fragments = expected_fragments(scene)
         table, where = rng.random(WIDTH * HEIGHT), rng.integers(0, WIDTH * HEIGHT, fragments)
         unit = cpu_seconds(lambda table=table, where=where: table.take(where) * 1.5)
-        buffer = cpu_seconds(lambda scene=scene: nearest_faces(scene))
+        buffer = cpu_seconds(
+            lambda scene=scene: nearest_faces(scene, triangles_of(scene, range(len(scene.meshes))))
+        )
         surface = cpu_seconds(lambda scene=scene: visible_surface(scene))
         print(
             f"{len(scene.meshes[0].faces):9d}  {fragments:9d}  {buffer:10.4f}"

@@ -1,4 +1,4 @@
-"""Stage: where viewing rays meet their triangles, and the colour there.
+"""Stage: where viewing rays meet their triangles, and the colour and the normal there.
 
 R rays, each with one triangle; weights (R, 3) are the barycentric coordinates in the world, at least 0 and
 with sum 1.  A vertex attribute at the hit is weights . attribute, with no division by depth: barycentric
@@ -15,7 +15,7 @@ v runs upwards and row 0 is the top: row = (1 - v) height - 1/2.
 
 import numpy as np
 
-from volref.arrays import Floats, Indices, Integers
+from volref.arrays import Booleans, Floats, Indices, Integers
 from volref.records import Rays
 from volref.scene.mesh import Mesh
 
@@ -53,9 +53,12 @@ def meet_triangles(rays: Rays, triangles: Floats) -> tuple[Floats, Floats]:
 
 
 def surface_colors(mesh: Mesh, faces: Integers, weights: Floats) -> Floats:
-    """Return the working-space colours (R, 3) at `weights` in the triangles `faces` (R,) of `mesh`."""
+    """Return the colours at `weights` in the triangles `faces` (R,) of `mesh`.
+
+    (R, 3), or (R, 4) if they have an alpha; colour and alpha are interpolated each by itself.
+    """
     if mesh.coloring == "uniform":
-        return np.broadcast_to(mesh.colors, (len(faces), 3))
+        return np.broadcast_to(mesh.colors, (len(faces), len(mesh.colors)))
     if mesh.coloring == "face":
         return mesh.colors[faces]
     if mesh.coloring == "vertex":
@@ -65,8 +68,37 @@ def surface_colors(mesh: Mesh, faces: Integers, weights: Floats) -> Floats:
     return texture_colors(mesh.texture, _interpolated(mesh.uv, mesh.faces[faces], weights), mesh.wrap)
 
 
+def surface_normals(mesh: Mesh, faces: Integers, weights: Floats) -> Floats:
+    """Return the unit normals (R, 3) at `weights` in the triangles `faces` (R,) of `mesh`.
+
+    Unit vertex normals are interpolated and brought to length 1 again (Phong 1975); 0 where they cancel.
+    Without them the normal is that of the triangle, out of its front.
+
+    Examples
+    --------
+    >>> mesh = Mesh([(0, 0, 0), (1, 0, 0), (0, 1, 0)], [(0, 1, 2)])
+    >>> surface_normals(mesh, np.array([0]), np.array([[0.5, 0.25, 0.25]])).tolist()
+    [[0.0, 0.0, 1.0]]
+    """
+    if mesh.normals is None:
+        a, b, c = (mesh.vertices[mesh.faces[faces, k]] for k in range(3))
+        return _unit(np.cross(_unit(b - a), _unit(c - a)))
+    corners = _unit(mesh.normals[mesh.faces[faces]])
+    first, second, third = (weights[:, k, None] * corners[:, k] for k in range(3))
+    return _unit(first + second + third)
+
+
+def back_sides(triangles: Floats, directions: Floats) -> Booleans:
+    """Say of each triangle (T, 3, 3) whether its back is seen in the direction (T, 3) that leads to it.
+
+    One that is seen exactly edge-on counts as seen from the front.
+    """
+    a, b, c = triangles.transpose(1, 0, 2)
+    return np.asarray((np.cross(b - a, c - a) * directions).sum(axis=1) > 0)
+
+
 def texture_colors(texture: Floats, uv: Floats, wrap: str) -> Floats:
-    """Return a texture (height, width, 3) interpolated bilinearly at `uv` (R, 2), see the head of this file.
+    """Return a texture (height, width, 3 or 4) interpolated bilinearly at `uv` (R, 2), see the head.
 
     Beyond the outer texel centres "repeat" goes on with the opposite side, "clamp" stays at the outer one.
 
@@ -121,6 +153,16 @@ def _nearest_weights(corners: Floats, directions: Floats) -> Floats:
 def _interpolated(attribute: Floats, corners: Integers, weights: Floats) -> Floats:
     """Return an attribute (V, A) of the vertices `corners` (R, 3) at `weights` (R, 3)."""
     return np.asarray(np.einsum("rk,rka->ra", weights, attribute[corners]))
+
+
+def _unit(vectors: Floats) -> Floats:
+    """Return vectors (..., 3) at length 1; 0 stays 0."""
+    # Scaled first: the squares of numbers below 1e-162 are zero.
+    largest = np.abs(vectors).max(axis=-1, keepdims=True)
+    scaled = vectors / np.where(largest > 0, largest, 1.0)
+    x, y, z = np.moveaxis(scaled, -1, 0)
+    length = np.sqrt(x * x + y * y + z * z)[..., None]
+    return np.asarray(scaled / np.where(length > 0, length, 1.0))
 
 
 def _neighbours(place: Floats, count: int, wrap: str) -> tuple[Indices, Indices, Floats]:

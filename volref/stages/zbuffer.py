@@ -116,7 +116,7 @@ def nearest_triangles(
     nearest_key = np.full(width * height, np.inf)
     nearest = np.full(width * height, NOTHING)
     for spans in _all_spans(vertices, corners, source, camera, width, height, batch):
-        _merge(_expanded(spans, camera.far, camera), nearest_key, nearest)
+        keep_nearest(*_expanded(spans, camera.far, camera), nearest_key, nearest)
     nearest[nearest == NOTHING] = -1
     return nearest
 
@@ -150,6 +150,21 @@ def all_fragments(
     for spans in _all_spans(vertices, corners, source, camera, width, height, batch):
         pixel, _, which = _expanded(spans, limit, camera)
         yield pixel, which
+
+
+def keep_nearest(
+    pixel: Integers, key: Floats, source: Integers, nearest_key: Floats, nearest: Integers
+) -> None:
+    """Put fragments (F,) into the buffers, in place; the order of calls does not matter.
+
+    Of equal keys the lowest source stays.  Buffers begin with keys of +inf and sources `NOTHING`.
+    """
+    before = nearest_key[pixel]
+    np.minimum.at(nearest_key, pixel, key)
+    wins = np.flatnonzero(key == nearest_key[pixel])
+    pixel = pixel[wins]
+    nearest[pixel[key[wins] < before[wins]]] = NOTHING
+    np.minimum.at(nearest, pixel, source[wins])
 
 
 def _all_spans(
@@ -306,14 +321,3 @@ def _expanded(spans: _Spans, far: float, camera: Camera) -> _Fragments:
         near = np.flatnonzero(key <= farthest)
         pixel, key, span = pixel[near], key[near], span[near]
     return _Fragments(pixel, key, spans.source[span])
-
-
-def _merge(fragments: _Fragments, nearest_key: Floats, nearest: Integers) -> None:
-    """Put fragments into the buffers; the order of calls does not matter."""
-    pixel, key, source = fragments
-    before = nearest_key[pixel]
-    np.minimum.at(nearest_key, pixel, key)
-    wins = np.flatnonzero(key == nearest_key[pixel])
-    pixel = pixel[wins]
-    nearest[pixel[key[wins] < before[wins]]] = NOTHING
-    np.minimum.at(nearest, pixel, source[wins])

@@ -1,17 +1,16 @@
-"""The conductor of the meshes: scene in, nearest opaque surface out.
+"""The conductor of the opaque meshes: scene in, nearest opaque surface out.
 
-V vertices and F triangles of all meshes of the scene, in the scene's order; H, W the image.
+H, W the image.
 """
 
 import numpy as np
 
-from volref.arrays import Floats, Indices, Integers
-from volref.records import Surface
+from volref.arrays import Integers
+from volref.records import Spans, Surface
 from volref.scene.scene import Scene
-from volref.stages.clipping import clip_triangles, project
-from volref.stages.rays import pixel_rays
-from volref.stages.surface import meet_triangles, surface_colors
-from volref.stages.zbuffer import guard_band, nearest_triangles
+from volref.stages.zbuffer import NOTHING, keep_nearest
+from volref.truth.cutting import caps, is_kept, kept_spans
+from volref.truth.triangles import Triangles, distances_of, fragments, nearest_faces, paint, triangles_of
 
 # Hits are shaded in parts: 2^15 of them with their triangles take 2.4 MB.
 HITS_PER_PART = 2**15
@@ -20,9 +19,12 @@ HITS_PER_PART = 2**15
 def visible_surface(scene: Scene) -> Surface:
     """Return the nearest opaque surface of all meshes at each pixel centre.
 
-    All meshes go through one z-buffer.  Coverage follows the top-left rule on a grid of 2^-16 pixel; the
-    distance is that of the float64 ray to the plane of the visible triangle.  Of coincident triangles the
+    All opaque meshes go through one z-buffer.  Coverage follows the top-left rule on a grid of 2^-16 pixel;
+    the distance is that of the float64 ray to the plane of the visible triangle.  Of coincident triangles the
     one with the lowest (mesh, face) is visible.
+
+    Where the scene has clipping planes, what counts is the distance of each fragment; a watertight mesh that
+    is cut open shows a face there, see `volref.truth.cutting.caps`.
 
     Examples
     --------
@@ -34,47 +36,49 @@ def visible_surface(scene: Scene) -> Surface:
     >>> surface.distance[1].tolist(), surface.color[1, 1].tolist()
     ([inf, 5.0, inf], [1.0, 0.0, 0.0])
     """
-    vertices, corners, starts = _joined(scene)
-    nearest = _nearest_faces(scene, vertices, corners)
-    distance = np.full(len(nearest), np.inf)
-    color = np.zeros((len(nearest), 3))
-    mesh, face = np.full(len(nearest), -1), np.full(len(nearest), -1)
+    opaque = [i for i, mesh in enumerate(scene.meshes) if not mesh.transparent]
+    triangles = triangles_of(scene, opaque)
+    kept = kept_spans(scene) if scene.clip else None
+    nearest = nearest_faces(scene, triangles) if kept is None else _nearest_kept(scene, triangles, kept)
+    surface = _painted(scene, triangles, nearest)
+    if kept is not None:
+        for index in opaque:
+            _add_caps(scene, index, kept, surface)
+    return surface
+
+
+def _painted(scene: Scene, triangles: Triangles, nearest: Integers) -> Surface:
+    """Return the surface of which the triangles `nearest` (H * W,) are seen."""
+    shape = scene.height, scene.width
+    distance, color = np.full(shape, np.inf), np.zeros((*shape, 3))
+    mesh, face = np.full(shape, -1), np.full(shape, -1)
+    flat_mesh, flat_face, flat_color = mesh.reshape(-1), face.reshape(-1), color.reshape(-1, 3)
     hits = np.flatnonzero(nearest >= 0)
     for part in np.array_split(hits, 1 + len(hits) // HITS_PER_PART):
-        rays = pixel_rays(scene.camera, scene.width, scene.height, part)
-        distance[part], weights = meet_triangles(rays, vertices[corners[:, nearest[part]].T])
-        mesh[part] = np.searchsorted(starts, nearest[part], side="right") - 1
-        face[part] = nearest[part] - starts[mesh[part]]
-        for index in np.unique(mesh[part]):
-            its = mesh[part] == index
-            color[part[its]] = surface_colors(scene.meshes[index], face[part[its]], weights[its])
-    shape = scene.height, scene.width
-    return Surface(
-        distance.reshape(shape), color.reshape(*shape, 3), mesh.reshape(shape), face.reshape(shape)
-    )
+        distance.reshape(-1)[part], flat_color[part], _ = paint(scene, triangles, part, nearest[part])
+        flat_mesh[part], flat_face[part] = triangles.owners(nearest[part])
+    return Surface(distance, color, mesh, face)
 
 
-def nearest_faces(scene: Scene) -> Integers:
-    """Return the visible triangle at each pixel (H * W,), counted through all meshes; -1 where none is."""
-    vertices, corners, _ = _joined(scene)
-    return _nearest_faces(scene, vertices, corners)
+def _nearest_kept(scene: Scene, triangles: Triangles, kept: Spans) -> Integers:
+    """Return the nearest triangle (H * W,) of what no clipping plane cuts away, -1 where there is none."""
+    nearest_distance = np.full(len(kept.t_near), np.inf)
+    nearest = np.full(len(kept.t_near), NOTHING)
+    for pixel, source in fragments(scene, triangles):
+        distance = distances_of(scene, triangles, pixel, source)
+        stays = is_kept(kept, pixel, distance)
+        keep_nearest(pixel[stays], distance[stays], source[stays], nearest_distance, nearest)
+    nearest[nearest == NOTHING] = -1
+    return nearest
 
 
-def _nearest_faces(scene: Scene, points: Floats, corners: Indices) -> Integers:
-    camera, width, height = scene.camera, scene.width, scene.height
-    vertices = project(points, camera, width, height)
-    clipped = clip_triangles(vertices, corners, camera, guard_band(width, height))
-    return nearest_triangles(*clipped, camera, width, height)
-
-
-def _joined(scene: Scene) -> tuple[Floats, Indices, Integers]:
-    """Return the vertices (V, 3) of all meshes, the corners (3, F) of all triangles, each mesh's first."""
-    counts = np.array([len(mesh.faces) for mesh in scene.meshes], dtype=np.int64)
-    starts = np.cumsum(counts) - counts
-    corners = np.empty((3, counts.sum()), np.int64)
-    first_vertex = 0
-    for mesh, start, count in zip(scene.meshes, starts, counts, strict=True):
-        np.add(mesh.faces.T, first_vertex, out=corners[:, start : start + count])
-        first_vertex += len(mesh.vertices)
-    vertices = np.concatenate([np.empty((0, 3)), *(mesh.vertices for mesh in scene.meshes)])
-    return vertices, corners, starts
+def _add_caps(scene: Scene, index: int, kept: Spans, surface: Surface) -> None:
+    """Put the cut faces of a mesh into the surface where they are nearer, in place."""
+    distance, color = surface.distance.reshape(-1), surface.color.reshape(-1, 3)
+    mesh, face = surface.mesh.reshape(-1), surface.face.reshape(-1)
+    for cap in caps(scene, index, kept):
+        there = distance[cap.pixel]
+        nearer = (cap.distance < there) | ((cap.distance == there) & (index <= mesh[cap.pixel]))
+        pixel = cap.pixel[nearer]
+        distance[pixel], color[pixel] = cap.distance[nearer], cap.color[nearer]
+        mesh[pixel], face[pixel] = index, -1
