@@ -4,6 +4,8 @@ The volume is a letter F of unequal slices; the places are oblique, anisotropic 
 NRRD and NIfTI are held in the same way in test_volumes.py.
 """
 
+import io
+import json
 import zipfile
 
 import h5py
@@ -17,6 +19,7 @@ import zarr
 
 from tests.dicom_files import write_series
 from tests.letters import FLIP_LPS, FLIPS, assert_places_equal, letter_f, oblique
+from volref.errors import FormatError
 from volref.io import load_volume, save_volume
 from volref.scene import Volume
 
@@ -216,3 +219,55 @@ def test_each_voxel_of_an_ome_zarr_level_lies_where_its_transformations_put_it(t
     for time in (0, 1):
         volume = load_volume(tmp_path / name, level=level, index=[time, 0])
         assert_places_equal(volume, affine, values[time, 0, ::step, ::step, ::step])
+
+
+def bvp_bytes(blocks, *, matrix=None, **change):
+    """Return a BVP file of (position (x, y, z), samples (z, y, x)) blocks, as VPT's converter writes it."""
+    values = letter_f(np.uint8)
+    depth, height, width = values.shape
+    modality = {"name": "default", "dimensions": {"width": width, "height": height, "depth": depth}}
+    modality |= {"format": 6403, "internalFormat": 33321, "type": 5121, "placements": []}
+    modality |= {} if matrix is None else {"transform": {"matrix": matrix}}
+    manifest = {"meta": {"version": 1}, "modalities": [modality | change], "blocks": []}
+    stream = io.BytesIO()
+    with zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED) as archive:
+        for number, (position, samples) in enumerate(blocks):
+            shape = dict(zip(("depth", "height", "width"), samples.shape, strict=True))
+            block = {"url": f"blocks/{number}", "format": "raw", "dimensions": shape}
+            manifest["blocks"].append(block)
+            place = {"index": number, "position": dict(zip("xyz", position, strict=True))}
+            modality["placements"].append(place)
+            archive.writestr(block["url"], samples.tobytes())
+        archive.writestr("manifest.json", json.dumps(manifest))
+    return stream.getvalue()
+
+
+def test_each_block_of_a_bvp_lies_where_the_manifest_puts_it(tmp_path):
+    values = letter_f(np.uint8)
+    starts = [(x, y, z) for x in (0, 3) for y in (0, 2) for z in (0, 1)]
+    parts = [
+        values[z : 1 if z == 0 else None, y : 2 if y == 0 else None, x : 3 if x == 0 else None]
+        for x, y, z in starts
+    ]
+    blocks = list(zip(starts, parts, strict=True))[::-1]
+    (tmp_path / "f.bvp").write_bytes(bvp_bytes(blocks))
+    volume = load_volume(tmp_path / "f.bvp")
+    assert np.array_equal(volume.values, values)
+    # The unit cube, within the rounding of a product and a sum.
+    assert volume.corners.min(axis=0) == pytest.approx([0, 0, 0], abs=1e-15)
+    assert volume.corners.max(axis=0) == pytest.approx([1, 1, 1], abs=1e-15)
+
+
+def test_a_bvp_with_a_matrix_that_vpt_never_reads_needs_its_spacing_stated(tmp_path):
+    matrix = np.diag([2.0, 1, 1, 1]).ravel().tolist()
+    (tmp_path / "f.bvp").write_bytes(bvp_bytes([((0, 0, 0), letter_f(np.uint8))], matrix=matrix))
+    with pytest.raises(FormatError, match="must state its spacing"):
+        load_volume(tmp_path / "f.bvp")
+    assert load_volume(tmp_path / "f.bvp", spacing=SPACING).spacing == SPACING
+
+
+def test_a_bvp_of_16_bits_as_older_files_say_it(tmp_path):
+    values = letter_f(np.uint16) * 300
+    old = {"type": None, "bits": 16, "components": 1}
+    (tmp_path / "f.bvp").write_bytes(bvp_bytes([((0, 0, 0), values)], **old))
+    assert np.array_equal(load_volume(tmp_path / "f.bvp").values, values)

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from volref.truth.result import Render
     from volref.truth.verification import Verification
 
-SUFFIXES = (".png", ".npy", ".npz")
+SUFFIXES = (".png", ".exr", ".npy", ".npz")
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
@@ -38,8 +38,8 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         metavar="OUT",
         action="append",
         required=True,
-        help="file to write: .png for people (8-bit sRGB), .npy and .npz exact (float64, premultiplied, "
-        "linear); may be given several times",
+        help="file to write: .png for people (8-bit sRGB), .exr (float32, premultiplied), .npy and .npz "
+        "exact (float64, premultiplied, linear); may be given several times",
     )
     add_accuracy(parser)
     parser.add_argument(

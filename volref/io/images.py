@@ -1,4 +1,4 @@
-"""Images from and to files: PNG for people, .npy and .npz exact."""
+"""Images from and to files: PNG for people, EXR for other programs, .npy and .npz exact."""
 
 from pathlib import Path
 
@@ -13,6 +13,7 @@ from volref.image import (
     premultiplied_from_straight,
     straight_from_premultiplied,
 )
+from volref.io.exr import read_exr, write_exr
 from volref.io.guard import DEFAULT_MAX_BYTES, existing_file, one_line
 from volref.io.npy import chosen_array, npz_headers, read_npy, read_npz, write_npy, write_npz
 from volref.io.png import read_png, write_png
@@ -27,7 +28,7 @@ def read_image(
     alpha: str | None = None,
     max_bytes: int = DEFAULT_MAX_BYTES,
 ) -> Floats:
-    """Return the premultiplied working-space image (height, width, 4) in a .png, .npy or .npz file.
+    """Return the premultiplied working-space image (height, width, 4) in a .png, .exr, .npy or .npz file.
 
     Integers are codes: divided by the largest of their type, then decoded.  Grey and RGB get alpha 1.
 
@@ -62,7 +63,9 @@ def read_image(
 
 
 def write_image(path: str | Path, rgba: Floats, *, encoding: str = "srgb", overwrite: bool = False) -> None:
-    """Write a premultiplied working-space image (height, width, 4): .npy and .npz as it is, .png encoded.
+    """Write a premultiplied working-space image (height, width, 4) to a file, by its suffix.
+
+    .npy and .npz hold it as it is, .exr rounded to float32, .png encoded.
 
     Raises
     ------
@@ -73,27 +76,32 @@ def write_image(path: str | Path, rgba: Floats, *, encoding: str = "srgb", overw
     suffix = Path(path).suffix.lower()
     if suffix == ".png":
         write_png(path, encode_rgba8(image, encoding), overwrite=overwrite)
+    elif suffix == ".exr":
+        write_exr(path, image, overwrite=overwrite)
     elif suffix == ".npy":
         write_npy(path, image, overwrite=overwrite)
     elif suffix == ".npz":
         write_npz(path, {"rgba": image}, overwrite=overwrite)
     else:
-        message = f"{one_line(Path(path).name)} must end in .png, .npy or .npz, got {suffix!r}; rename it"
-        raise FormatError(message)
+        message = f"{one_line(Path(path).name)} must end in .png, .exr, .npy or .npz, got {suffix!r}; "
+        raise FormatError(message + "rename it")
 
 
 def _read_codes(file: Path, max_bytes: int) -> Numbers:
     suffix = file.suffix.lower()
     if suffix == ".png":
         return read_png(file, max_bytes)
-    if suffix == ".npy":
+    if suffix == ".exr":
+        codes = read_exr(file, max_bytes)
+        codes = codes[..., 0] if codes.shape[2] == 1 else codes
+    elif suffix == ".npy":
         codes = read_npy(file, max_bytes)
     elif suffix == ".npz":
         name = chosen_array(file, npz_headers(file), None, "rgba", 3)
         codes = read_npz(file, (name,), max_bytes)[name]
     else:
-        message = f"{one_line(file.name)} must end in .png, .npy or .npz, got {suffix!r}; convert it to PNG"
-        raise FormatError(message)
+        message = f"{one_line(file.name)} must end in .png, .exr, .npy or .npz, got {suffix!r}; "
+        raise FormatError(message + "convert it to PNG")
     image = codes.ndim == 2 or (codes.ndim == 3 and codes.shape[2] in (3, 4))
     if not image or codes.dtype.kind not in "uf":
         message = (

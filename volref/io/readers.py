@@ -12,6 +12,7 @@ import numpy as np
 from volref.arrays import Numbers
 from volref.errors import FormatError
 from volref.io.atlas import AtlasLayout, read_atlas
+from volref.io.bvp import read_bvp
 from volref.io.dicom import read_dicom
 from volref.io.guard import one_line
 from volref.io.hdf5 import read_hdf5
@@ -147,6 +148,10 @@ def _read_zarr(file: Path, own: Statement, max_bytes: int) -> Found:
     return read_zarr(file, own.get("key"), own.get("level"), own.get("index"), max_bytes)
 
 
+def _read_bvp(file: Path, own: Statement, max_bytes: int) -> Found:
+    return read_bvp(file, own.get("key"), max_bytes)
+
+
 def _never(_: Path) -> bool:
     return False
 
@@ -176,6 +181,7 @@ READERS = {
     ".hdf5": _HDF5,
     ".zarr": _ZARR,
     ".zarr.zip": _ZARR,
+    ".bvp": Reader("BVP", _read_bvp, ("key",), placed=False),
     ".raw": _RAW,
     ".bin": _RAW,
     ".png": Reader("PNG atlas", _read_atlas, ATLAS_KEYS, ATLAS_NEEDED),

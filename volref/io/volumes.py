@@ -45,6 +45,7 @@ def load_volume(
                             "spacing", "origin", "direction", "centering", "spacing_zyx" or "element_size_um"
     .zarr .zarr.zip         Zarr (extra `zarr`): the array `key` of a group, or its only one with 3 axes; of
                             an OME-Zarr image the array `level` (0), `index` of its axes t and c
+    .bvp                    the volumes of VPT: its only modality, or `key`; the unit cube, as VPT shows it
     .raw .bin               needs size, dtype, byte_order, skip and spacing, see `load_raw`
     .png                    slice atlas, needs tiles_across, tiles_down and slices, see `volref.io.atlas`
     ======================  ==============================================================================
