@@ -74,7 +74,10 @@ def real_ct():
     # Whole numbers at the samples, and knots at whole numbers: cells that are constant on a knot.
     yield from _both("stent", stent, TransferFunction([2, 8, 12, 20, 32], COLORS, [0, 0.02, 0.0, 0.3, 1.0]))
     head = load_scene(Path(volref.__file__).parent / "demo_data" / "scene.json")
-    yield "head", Scene(head.volume, head.transfer, head.camera, SIDE, SIDE, head.meshes, head.background)
+    yield (
+        "head",
+        Scene(head.volume, head.transfer, head.camera, SIDE, SIDE, head.meshes, background=head.background),
+    )
 
 
 def degenerate():

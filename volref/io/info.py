@@ -20,8 +20,10 @@ from volref.io.transfer import FORMAT as TRANSFER_FORMAT
 from volref.io.transfer import load_transfer
 from volref.io.volumes import load_volume
 from volref.scene.mesh import Mesh
+from volref.scene.radar import RadarVolume
 from volref.scene.scene import Scene
 from volref.scene.transfer import TransferFunction
+from volref.scene.transfer2d import TransferFunction2D
 from volref.scene.volume import Volume
 
 
@@ -61,9 +63,12 @@ def describe_file(
     return about | _describe_image(file, max_bytes)
 
 
-def describe_volume(volume: Volume) -> dict[str, Any]:
-    """Return size, type, place, range and memory of a volume."""
+def describe_volume(volume: Volume | RadarVolume) -> dict[str, Any]:
+    """Return size, type, place, range and memory of a volume, or sweeps, box and range of a radar's."""
     low, high = volume.value_bounds
+    if isinstance(volume, RadarVolume):
+        box = [end.tolist() for end in volume.box]
+        return {"sweeps": len(volume.sweeps), "bounds": box, "value_range": [low, high]}
     return {
         "size": list(volume.size),
         "dtype": volume.values.dtype.name,
@@ -103,8 +108,15 @@ def is_watertight(mesh: Mesh) -> bool:
     return bool((np.unique(edges, axis=0, return_counts=True)[1] == 2).all())
 
 
-def describe_transfer(transfer: TransferFunction) -> dict[str, Any]:
+def describe_transfer(transfer: TransferFunction | TransferFunction2D) -> dict[str, Any]:
     """Return knots, range, interpolation and unit distance of a transfer function."""
+    if isinstance(transfer, TransferFunction2D):
+        return {
+            "entries": list(transfer.rgba.shape[:2]),
+            "value_range": list(transfer.value_domain),
+            "magnitude_range": list(transfer.magnitude_domain),
+            "unit_distance": transfer.unit_distance,
+        }
     return {
         "knots": len(transfer.values),
         "value_range": [float(transfer.values[0]), float(transfer.values[-1])],
@@ -141,7 +153,7 @@ def _kind_of(file: Path, max_bytes: int) -> str:
     if suffix == ".npz":
         names = npz_headers(file)
         return "mesh" if {"vertices", "faces"} <= set(names) else "image" if "rgba" in names else "volume"
-    if suffix == ".png":
+    if suffix in (".png", ".exr"):
         return "image"
     if is_volume_path(file):
         return "volume"

@@ -14,12 +14,13 @@ from volref.io.documents import FORMAT_VERSION, check_document, check_format, wh
 from volref.io.guard import DEFAULT_MAX_BYTES, one_line, path_inside, read_json
 from volref.io.meshes import load_meshes, save_mesh
 from volref.io.npy import write_npy
-from volref.io.transfer import document_of_transfer, load_transfer, transfer_of_document
+from volref.io.transfer import load_transfer
+from volref.io.transfer_json import document_of_transfer, transfer_of_document
 from volref.io.volumes import load_volume
 from volref.scene.camera import Camera
 from volref.scene.mesh import Mesh
 from volref.scene.scene import Scene
-from volref.scene.transfer import TransferFunction
+from volref.scene.transfer2d import AnyTransfer
 from volref.scene.volume import Volume
 
 FORMAT = "volref-scene"
@@ -59,11 +60,15 @@ def load_scene(path: str | Path, *, allow_outside: bool = False, max_bytes: int 
     if "volume" in document:
         statement = {key: value for key, value in document["volume"].items() if key != "path"}
         volume = load_volume(beside(document["volume"]), max_bytes=max_bytes, **statement)
-    transfer: TransferFunction | None = None
+    transfer: AnyTransfer | None = None
     if "transfer" in document:
         entry = document["transfer"]
         options = {key: value for key, value in entry.items() if key != "path"}
-        transfer = load_transfer(beside(entry), **options) if "path" in entry else transfer_of_document(entry)
+        transfer = (
+            load_transfer(beside(entry), **options)
+            if "path" in entry
+            else transfer_of_document(entry, file, allow_outside=allow_outside)
+        )
     return Scene(
         volume,
         transfer,
@@ -102,10 +107,11 @@ def save_scene(scene: Scene, path: str | Path, *, overwrite: bool = False) -> No
         "camera": document_of_camera(scene.camera),
         "background": list(scene.background),
     }
-    if scene.volume is not None and scene.transfer is not None:
-        write_npy(file.with_name(volume_name), scene.volume.values, overwrite=overwrite)
-        document["volume"] = {"path": volume_name, **document_of_placement(scene.volume)}
-        document["transfer"] = document_of_transfer(scene.transfer)
+    if scene.volume is not None:
+        volume, transfer = scene.gridded
+        write_npy(file.with_name(volume_name), volume.values, overwrite=overwrite)
+        document["volume"] = {"path": volume_name, **document_of_placement(volume)}
+        document["transfer"] = document_of_transfer(transfer)
     for name, mesh in names.items():
         save_mesh(mesh, file.with_name(name), overwrite=overwrite)
     document["meshes"] = [{"path": name} for name in names]

@@ -42,10 +42,10 @@ def separable_image(scene: Scene) -> Floats:
     >>> separable_image(scene).tolist()
     [[[0.9, 0.5, 0.2, 1.0]]]
     """
-    volume, table = scene.volume, scene.transfer
-    if volume is None or table is None or scene.meshes:
-        message = "scene must hold a volume and no mesh for the closed form, got another; remove the meshes"
+    if scene.volume is None or scene.meshes or scene.lights or scene.clip or scene.mode != "composite":
+        message = "scene must hold a volume and no more for the closed form, got another; remove the rest"
         raise SceneError(message)
+    volume, table = scene.gridded
     profiles, pieces = _profiles(volume), _table_pieces(table)
     image = np.empty((scene.height, scene.width, 4))
     for row in range(scene.height):

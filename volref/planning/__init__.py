@@ -15,21 +15,22 @@ from volref.planning.choices import (
     TERMINATION,
     background_stage,
     colour_stage,
-    diagonal_of,
     early_termination,
     empty_space,
+    light_stages,
     may_be_seen,
     meshes_stage,
     missing_rays,
     never_needed,
     precision_of,
+    sampled_because,
     step_length,
     volume_stage,
 )
 from volref.planning.record import SEGMENTS_PER_BLOCK, SHORTCUTS, Occupancy, Plan, Stage
 from volref.scene.footprint import footprint
-from volref.scene.rounding import float32_error
 from volref.scene.scene import Scene
+from volref.scene.volume import Volume
 
 __all__ = [
     "BLOCK",
@@ -44,6 +45,7 @@ __all__ = [
     "Stage",
     "may_be_seen",
     "plan",
+    "sampled_because",
 ]
 
 # Half a level of an 8-bit image: below it a difference cannot be seen after rounding.
@@ -95,7 +97,11 @@ def plan(
     _refuse_what_is_not_built(scene)
     one_of("method", method, METHODS)
     number("tolerance", tolerance, above=0)
-    if method == "auto" and certified:
+    sampled = sampled_because(scene)
+    if method == "exact" and sampled:
+        message = f"method must be 'march' or 'auto' for {sampled}, got 'exact'; the result is an estimate"
+        raise SceneError(message)
+    if method == "auto" and certified and not sampled:
         method = "exact"
     if method != "march":
         if step is not None:
@@ -106,24 +112,25 @@ def plan(
     if scene.volume is None or scene.transfer is None:
         stages.append(Stage("volume", included=False, reason="the scene has none"))
         return Plan(scene, method, 0.0, tolerance, 0.0, 0, None, (*stages, background_stage(scene)))
-    length, most_segments = step_length(scene.volume, step)
-    seen = bool(may_be_seen(scene.transfer, *map(np.array, scene.volume.value_bounds)))
-    stages.append(volume_stage(scene.volume, seen=seen))
+    length, most_segments = step_length(scene, step)
+    seen = bool(may_be_seen(scene.envelope, *map(np.array, scene.volume.value_bounds)))
+    stages.append(volume_stage(scene, seen=seen))
     if not seen:
         return Plan(scene, method, length, tolerance, 0.0, 0, None, (*stages, background_stage(scene)))
-    indices = float(np.linalg.norm(scene.volume.index_from_world[:3, :3], axis=1).max())
+    indices = 1.0
+    if isinstance(scene.volume, Volume):
+        indices = float(np.linalg.norm(scene.volume.index_from_world[:3, :3], axis=1).max())
     block = SEGMENTS_PER_BLOCK if SEGMENTS_PER_BLOCK * length * indices <= LONGEST_BLOCK else 3
     missing, occupancy = missing_rays(scene), None
     empty = Stage("empty space", included=False, reason="nothing of the volume is on the screen")
     if footprint(scene).pixels:
-        occupancy, empty = empty_space(scene.volume, scene.transfer, length * block)
-    termination, ending = early_termination(scene.volume, scene.transfer)
-    palette, colour = colour_stage(scene.transfer)
+        occupancy, empty = empty_space(scene, length * block)
+    termination, ending = early_termination(scene)
+    palette, colour = colour_stage(scene)
     furthest = block * length * indices
-    error = float32_error(scene.volume, scene.transfer, diagonal_of(scene.volume), furthest)
-    kind, rounding, float64 = precision_of(scene.transfer, error, most_segments, tolerance, precision)
+    kind, rounding, float64 = precision_of(scene, furthest, most_segments, tolerance, precision)
     stages.extend([missing, empty, ending, colour, float64])
-    stages.extend([*never_needed(), background_stage(scene)])
+    stages.extend([*light_stages(scene), *never_needed(), background_stage(scene)])
     return Plan(
         scene,
         method,
@@ -142,7 +149,7 @@ def plan(
 
 def _refuse_what_is_not_built(scene: Scene) -> None:
     """Refuse what a scene can say and no integrator does yet: an image without it would be wrong."""
-    plain: dict[str, object] = {"lights": (), "mode": "composite", "classification": "post"}
+    plain: dict[str, object] = {"mode": "composite"}
     if scene.meshes:
         plain["clip"] = ()
     for name, value in plain.items():
@@ -157,14 +164,14 @@ def _stepless(scene: Scene, method: str, tolerance: float) -> Plan:
     if scene.volume is None or scene.transfer is None:
         stages.append(Stage("volume", included=False, reason="the scene has none"))
     else:
-        seen = bool(may_be_seen(scene.transfer, *map(np.array, scene.volume.value_bounds)))
-        stages.append(volume_stage(scene.volume, seen=seen))
+        seen = bool(may_be_seen(scene.envelope, *map(np.array, scene.volume.value_bounds)))
+        stages.append(volume_stage(scene, seen=seen))
         if seen:
             reason = "cells that are transparent are not integrated"
             stages.append(missing_rays(scene))
             stages.append(
                 Stage("empty space", included=True, reason=reason, saves="their crossings and cubics")
             )
-            stages.extend(never_needed())
+            stages.extend([*light_stages(scene), *never_needed()])
     stages.append(background_stage(scene))
     return Plan(scene, method, 0.0, tolerance, 0.0, 0, None, tuple(stages))

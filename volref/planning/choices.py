@@ -10,9 +10,12 @@ from volref.errors import SceneError
 from volref.planning.record import Occupancy, Stage
 from volref.scene.blocks import flag_blocks
 from volref.scene.footprint import footprint
-from volref.scene.palette import Palette, palette_of
+from volref.scene.palette import FULL_PALETTE, Palette, palette_of
+from volref.scene.radar import RadarVolume
+from volref.scene.rounding import float32_error
 from volref.scene.scene import Scene
 from volref.scene.transfer import TransferFunction
+from volref.scene.transfer2d import TransferFunction2D
 from volref.scene.volume import Volume
 
 # A ray ends when less than this part of the light behind it would arrive.
@@ -49,21 +52,50 @@ def missing_rays(scene: Scene) -> Stage:
     return Stage("rays that miss", included=False, reason=reason, saves="their rays")
 
 
+def light_stages(scene: Scene) -> list[Stage]:
+    """Take gradients and light only if the look of the volume depends on them."""
+    reason = "the volume is not lit, and the transfer function is of the value alone"
+    gradients = Stage("gradients", included=False, reason=reason, saves="six samples for each one seen")
+    if scene.needs_gradient:
+        reason = f"{scene.gradient}, where anything is seen"
+        gradients = Stage("gradients", included=True, reason=reason)
+    if scene.lights_volume:
+        model = "phong" if scene.material is None else scene.material.model
+        count = len(scene.lights)
+        reason = f"{count} light{'s' * (count > 1)}, {model}"
+        return [gradients, Stage("lighting", included=True, reason=reason)]
+    reason = "the volume answers none" if scene.lights else "no light"
+    reason += ": colours are emitted as they are"
+    return [gradients, Stage("lighting", included=False, reason=reason)]
+
+
 def never_needed() -> list[Stage]:
     """Return what no scene of today needs, and why."""
     return [
-        Stage(
-            "gradients", included=False, reason="no light, and the transfer function is of the value alone"
-        ),
-        Stage("lighting", included=False, reason="no light: colours are emitted as they are"),
         Stage("jitter", included=False, reason="rays begin where they meet the volume"),
         Stage("tone mapping", included=False, reason="the image stays in the working space"),
     ]
 
 
-def colour_stage(transfer: TransferFunction) -> tuple[Palette, Stage]:
+def sampled_because(scene: Scene) -> str:
+    """Say what of a scene the exact integrator does not cover, or nothing."""
+    if isinstance(scene.volume, RadarVolume):
+        return "a radar volume"
+    if isinstance(scene.transfer, TransferFunction2D):
+        return "a transfer function of value and gradient"
+    if scene.lights_volume:
+        return "a lit volume"
+    if scene.needs_gradient:
+        return "gradient opacity"
+    return "" if scene.classification == "post" else f"classification {scene.classification!r}"
+
+
+def colour_stage(scene: Scene) -> tuple[Palette, Stage]:
     """Look up each colour channel only once, and none that is constant where anything is seen."""
-    palette, name = palette_of(transfer), "colour"
+    if sampled_because(scene):
+        reason = f"all channels are looked up in {sampled_because(scene)}"
+        return FULL_PALETTE, Stage("colour", included=True, reason=reason)
+    palette, name = palette_of(scene.envelope), "colour"
     left_out = 3 - len(palette.looked_up)
     saves = f"{left_out} of 4 channels of look-up and compositing"
     if left_out == 0:
@@ -78,14 +110,26 @@ def colour_stage(transfer: TransferFunction) -> tuple[Palette, Stage]:
 
 
 def precision_of(
-    transfer: TransferFunction, rounding: float, most_segments: int, tolerance: float, precision: str | None
+    scene: Scene, furthest: float, most_segments: int, tolerance: float, precision: str | None
 ) -> tuple[str, float, Stage]:
-    """Choose float32 where what it can change is a small part of the tolerance."""
+    """Choose float32 where what it can change is a small part of the tolerance.
+
+    `furthest` is how many voxels a block of segments goes.
+    """
     name = "float64"
     if precision is not None:
         one_of("precision", precision, ("float64", "float32"))
     if precision == "float64":
         return "float64", 0.0, Stage(name, included=True, reason="asked for")
+    if sampled_because(scene):
+        if precision == "float32":
+            message = (
+                f"precision must be 'float64' with {sampled_because(scene)}, got 'float32'; leave it out"
+            )
+            raise SceneError(message)
+        return "float64", 0.0, Stage(name, included=True, reason=f"always with {sampled_because(scene)}")
+    volume, transfer = scene.gridded
+    rounding = float32_error(volume, transfer, diagonal_of(scene), furthest)
     brightest = max(float(transfer.colors.max()), 1.0)
     most = (rounding + most_segments * float(np.finfo(np.float32).eps)) * brightest
     words = (
@@ -117,20 +161,33 @@ def background_stage(scene: Scene) -> Stage:
     return Stage("background", included=False, reason="clear: nothing to blend with")
 
 
-def volume_stage(volume: Volume, *, seen: bool) -> Stage:
+def volume_stage(scene: Scene, *, seen: bool) -> Stage:
     """Integrate the volume unless none of its values shows."""
+    volume = scene.volume
+    assert volume is not None
     low, high = volume.value_bounds
     if not seen:
         reason = f"opacity 0 for every value from {low:g} to {high:g}"
         return Stage("volume", included=False, reason=reason)
-    reason = f"{' x '.join(map(str, volume.size))} {volume.values.dtype}, values {low:g} to {high:g}"
+    if isinstance(volume, Volume):
+        what = f"{' x '.join(map(str, volume.size))} {volume.values.dtype}"
+    else:
+        what = f"{len(volume.sweeps)} sweeps of a radar"
+    reason = f"{what}, values {low:g} to {high:g}"
     return Stage("volume", included=True, reason=reason)
 
 
-def step_length(volume: Volume, step: float | None) -> tuple[float, int]:
+def finest_detail(scene: Scene) -> float:
+    """Return the least world distance between neighbouring samples."""
+    volume = scene.volume
+    assert volume is not None
+    return min(volume.spacing) if isinstance(volume, Volume) else volume.gate_length
+
+
+def step_length(scene: Scene, step: float | None) -> tuple[float, int]:
     """Return the length of a segment, and how many the longest ray has."""
-    diagonal = diagonal_of(volume)
-    length = min(volume.spacing) / 2 if step is None else number("step", step, above=0)
+    diagonal = diagonal_of(scene)
+    length = finest_detail(scene) / 2 if step is None else number("step", step, above=0)
     if step is None and diagonal > length * MOST_DEFAULT_SEGMENTS:
         message = f"step must be stated for this volume, got the default {length:g}, half the least spacing, "
         message += (
@@ -143,14 +200,17 @@ def step_length(volume: Volume, step: float | None) -> tuple[float, int]:
     return length, math.ceil(diagonal / length)
 
 
-def diagonal_of(volume: Volume) -> float:
-    """Return the longest way through a volume."""
-    offsets = volume.corners[:, None] - volume.corners[None]
+def diagonal_of(scene: Scene) -> float:
+    """Return the longest way through the volume's box."""
+    offsets = scene.corners[:, None] - scene.corners[None]
     return float(np.linalg.norm(offsets, axis=-1).max())
 
 
-def empty_space(volume: Volume, transfer: TransferFunction, block: float) -> tuple[Occupancy | None, Stage]:
+def empty_space(scene: Scene, block: float) -> tuple[Occupancy | None, Stage]:
     """Mark the cells that have something visible within half the length of a block of segments, `block`."""
+    volume = scene.volume
+    if not isinstance(volume, Volume):
+        return None, Stage("empty space", included=False, reason="a radar volume has no blocks of cells")
     half = block / 2 * (1 + REACH_MARGIN)
     # A unit step in the world moves at most this many indices along each axis.
     indices_per_length = np.linalg.norm(volume.index_from_world[:3, :3], axis=1)
@@ -158,7 +218,7 @@ def empty_space(volume: Volume, transfer: TransferFunction, block: float) -> tup
     name = "empty space"
     if max(x, y, z) > max(volume.size):
         return None, Stage(name, included=False, reason="one block of segments is longer than the volume")
-    occupied = flag_blocks(volume, BLOCK, (x, y, z), partial(may_be_seen, transfer))
+    occupied = flag_blocks(volume, BLOCK, (x, y, z), partial(may_be_seen, scene.envelope))
     empty = 1 - float(occupied.mean())
     reason = f"{empty:.0%} of the {BLOCK}^3 blocks are transparent with their surroundings"
     if empty < LEAST_EMPTY_PART:
@@ -180,10 +240,11 @@ def may_be_seen(transfer: TransferFunction, low: Floats, high: Floats) -> Boolea
     return transfer.is_visible(low - slack, high + slack)
 
 
-def early_termination(volume: Volume, transfer: TransferFunction) -> tuple[float, Stage]:
+def early_termination(scene: Scene) -> tuple[float, Stage]:
     """End rays early where their optical depth can be great enough."""
-    name = "early termination"
-    most = transfer.most_extinction(*volume.value_bounds) * diagonal_of(volume)
+    name, volume = "early termination", scene.volume
+    assert volume is not None
+    most = scene.envelope.most_extinction(*volume.value_bounds) * diagonal_of(scene)
     if most < -math.log(TERMINATION):
         reason = f"the optical depth of a ray cannot exceed {most:.3g}"
         return 0.0, Stage(name, included=False, reason=reason)

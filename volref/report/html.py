@@ -18,6 +18,7 @@ from volref.report.figures import KINDS, Figures, figures_of, levels
 from volref.report.pictures import VIRIDIS, ColoredMap, distance_map, error_map, png_bytes
 from volref.scene.camera import Camera
 from volref.scene.mesh import Mesh
+from volref.scene.radar import RadarVolume
 from volref.scene.scene import Scene
 from volref.scene.volume import Volume
 from volref.truth.result import Render
@@ -77,7 +78,7 @@ def scene_rows(scene: Scene, unit: str = "world units") -> list[Row]:
     if scene.volume is not None:
         rows += _volume_rows(scene.volume, unit)
     if scene.transfer is not None:
-        knots, kind = scene.transfer.values, scene.transfer.interpolation
+        knots, kind = scene.envelope.values, scene.envelope.interpolation
         span = f"{knots[0]:g} to {knots[-1]:g}"
         rows.append(("transfer function", f"{len(knots)} knots from {span}, {kind} linear between them"))
     rows += [_mesh_row(i, mesh) for i, mesh in enumerate(scene.meshes)]
@@ -98,8 +99,11 @@ def version_rows() -> list[Row]:
     ]
 
 
-def _volume_rows(volume: Volume, unit: str) -> list[Row]:
+def _volume_rows(volume: Volume | RadarVolume, unit: str) -> list[Row]:
     low, high = volume.value_bounds
+    if isinstance(volume, RadarVolume):
+        words = f"{len(volume.sweeps)} sweeps of a weather radar, {volume.quantity}"
+        return [("volume", words), ("values", f"{low:g} to {high:g} {volume.units}")]
     return [
         ("volume", f"{' x '.join(map(str, volume.size))} voxels, {volume.values.dtype}"),
         ("spacing", f"{' x '.join(f'{s:g}' for s in volume.spacing)} {unit}"),

@@ -38,10 +38,9 @@ def footprint(scene: Scene) -> Rectangle:
     >>> footprint(Scene(volume, table, camera, 8, 8))
     Rectangle(left=0, right=4, top=0, bottom=5)
     """
-    assert scene.volume is not None
     width, height = scene.width, scene.height
     everything = Rectangle(0, width, 0, height)
-    points = np.concatenate([scene.volume.corners, np.ones((8, 1))], axis=1)
+    points = np.concatenate([scene.corners, np.ones((8, 1))], axis=1)
     view = points @ scene.camera.view_from_world.T
     clip = view @ scene.camera.clip_from_view(width, height).T
     if not scene.camera.is_parallel:

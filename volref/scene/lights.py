@@ -22,7 +22,7 @@ from volref.arrays import LARGEST_LENGTH, Floats, Vector, float_array, number, o
 from volref.errors import SceneError
 
 LIGHT_KINDS = ("ambient", "directional", "point", "headlight")
-MODELS = ("lambert", "phong", "blinn-phong")
+MODELS = ("lambert", "phong", "blinn-phong", "unlit")
 WHITE = (1.0, 1.0, 1.0)
 
 
@@ -107,7 +107,8 @@ class Material:
     Parameters
     ----------
     model
-        "lambert" (no highlights), "phong" or "blinn-phong".
+        "lambert" (no highlights), "phong", "blinn-phong", or "unlit": a volume emits its colours as they are,
+        whatever lights there are for the meshes.
     ambient, diffuse, specular
         k_a, k_d and k_s, at least 0.
     shininess

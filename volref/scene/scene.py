@@ -13,7 +13,9 @@ from volref.scene.camera import Camera
 from volref.scene.lights import Light, Material
 from volref.scene.mesh import Mesh
 from volref.scene.plane import Plane
+from volref.scene.radar import RadarVolume
 from volref.scene.transfer import TransferFunction
+from volref.scene.transfer2d import TransferFunction2D
 from volref.scene.volume import Volume
 
 LARGEST_IMAGE_SIDE = 65536
@@ -41,9 +43,11 @@ class Scene:
     meshes
         Surfaces; opaque ones end the volume integral where the ray meets them.
     lights
-        Without any, the volume's colours are emitted as they are.  Meshes answer them if they are `lit`.
+        Without any, the volume's colours are emitted as they are, and so are those of a radar volume.  Meshes
+        answer them if they are `lit`.
     material
-        How the volume and lit meshes answer lights; default `Material()`.
+        How the volume and lit meshes answer lights; default `Material()`.  With model "unlit" the volume does
+        not, and meshes answer as `Material()`.
     background
         Premultiplied RGBA that lies behind everything.
     mode
@@ -69,8 +73,8 @@ class Scene:
         If a field breaks one of these rules.
     """
 
-    volume: Volume | None
-    transfer: TransferFunction | None
+    volume: Volume | RadarVolume | None
+    transfer: TransferFunction | TransferFunction2D | None
     camera: Camera
     width: int
     height: int
@@ -87,8 +91,8 @@ class Scene:
 
     def __init__(
         self,
-        volume: Volume | None,
-        transfer: TransferFunction | None,
+        volume: Volume | RadarVolume | None,
+        transfer: TransferFunction | TransferFunction2D | None,
         camera: Camera,
         width: int,
         height: int,
@@ -104,8 +108,8 @@ class Scene:
         gradient: str = "central",
         classification: str = "post",
     ) -> None:
-        _check_type("scene.volume", volume, Volume, optional=True)
-        _check_type("scene.transfer", transfer, TransferFunction, optional=True)
+        _check_type("scene.volume", volume, Volume, RadarVolume, optional=True)
+        _check_type("scene.transfer", transfer, TransferFunction, TransferFunction2D, optional=True)
         _check_type("scene.camera", camera, Camera)
         _check_type("scene.material", material, Material, optional=True)
         _check_type("scene.slice_plane", slice_plane, Plane, optional=True)
@@ -140,12 +144,66 @@ class Scene:
             classification=one_of("scene.classification", classification, CLASSIFICATIONS),
         )
         camera.check_aspect(self.width, self.height)
+        _check_look(self)
+
+    @property
+    def corners(self) -> Floats:
+        """The eight world corners (8, 3) of the box around all that the volume can show."""
+        assert self.volume is not None
+        if isinstance(self.volume, Volume):
+            return self.volume.corners
+        low, high = self.volume.box
+        return np.array([[(low, high)[k >> axis & 1][axis] for axis in range(3)] for k in range(8)])
+
+    @property
+    def envelope(self) -> TransferFunction:
+        """The transfer function of the value alone that is nowhere below the scene's."""
+        assert self.transfer is not None
+        return self.transfer.envelope if isinstance(self.transfer, TransferFunction2D) else self.transfer
+
+    @property
+    def lights_volume(self) -> bool:
+        """Whether the volume answers lights."""
+        unlit = self.material is not None and self.material.model == "unlit"
+        return bool(self.lights) and isinstance(self.volume, Volume) and not unlit
+
+    @property
+    def needs_gradient(self) -> bool:
+        """Whether how the volume looks depends on its gradient."""
+        transfer = self.transfer
+        by_gradient = isinstance(transfer, TransferFunction) and transfer.gradient_opacity is not None
+        return self.lights_volume or by_gradient or isinstance(transfer, TransferFunction2D)
+
+    @property
+    def gridded(self) -> tuple[Volume, TransferFunction]:
+        """The volume and the transfer function of a scene known to have a grid and a table of values."""
+        assert isinstance(self.volume, Volume)
+        assert isinstance(self.transfer, TransferFunction)
+        return self.volume, self.transfer
 
 
-def _check_type(name: str, value: object, kind: type, *, optional: bool = False) -> None:
-    if isinstance(value, kind) or (optional and value is None):
+def _check_look(scene: Scene) -> None:
+    """Refuse what does not go together."""
+    name = ""
+    if isinstance(scene.volume, RadarVolume):
+        kind, needed = "a radar volume", "resample it to a Volume first"
+        if scene.needs_gradient:
+            name, got = "transfer", "one that asks for the gradient"
+        elif scene.classification != "post":
+            name, got = "classification", repr(scene.classification)
+    elif scene.classification != "post" and scene.needs_gradient:
+        kind, needed = f"classification {scene.classification!r}", "use classification 'post'"
+        name, got = ("material", "a lit one") if scene.lights_volume else ("transfer", "one of the gradient")
+    if name:
+        message = f"scene.{name} must suit {kind}, which has no gradient, got {got}; {needed}"
+        raise SceneError(message)
+
+
+def _check_type(name: str, value: object, *kinds: type, optional: bool = False) -> None:
+    if isinstance(value, kinds) or (optional and value is None):
         return
-    message = f"{name} must be a volref.{kind.__name__}, got {type(value).__name__}; build one first"
+    words = " or ".join(f"volref.{kind.__name__}" for kind in kinds)
+    message = f"{name} must be a {words}, got {type(value).__name__}; build one first"
     raise SceneError(message)
 
 

@@ -13,6 +13,7 @@ from its knot on:
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
@@ -184,7 +185,19 @@ def _entries(table: Table, values: Floats, work: Workspace) -> Indices:
     return entry
 
 
-def segment_opacity(table: Table, strength: Floats, length: float | Floats) -> Floats:
+class Strength(Protocol):
+    """What says how strength is meant: a `Table`, a transfer function, or a field."""
+
+    @property
+    def interpolation(self) -> str:
+        """It is an "extinction" per world unit or an "opacity" per unit distance."""
+
+    @property
+    def unit_distance(self) -> float:
+        """The world length for which an opacity is meant."""
+
+
+def segment_opacity(table: Strength, strength: Floats, length: float | Floats) -> Floats:
     """Overwrite `strength`, the extinction or opacity of samples, with the opacity of their segments.
 
     The extinction of a segment of `length` l is taken as constant: opacity = 1 - e^(-extinction l) from

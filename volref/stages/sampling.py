@@ -74,10 +74,14 @@ def grid_of(volume: Volume, dtype: np.typing.DTypeLike = np.float64) -> Grid:
 
 def padded_grid(volume: Volume, dtype: np.dtype[Any] | None = None) -> Grid:
     """Return a padded copy of a volume for gathering, in `dtype` or its own type."""
-    nz, ny, nx = volume.values.shape
-    kind = dtype or volume.values.dtype
-    padded = np.empty((nz + 2 * PAD, ny + 2 * PAD, nx + 2 * PAD), kind)
-    padded[1:-1, 1:-1, 1:-1] = volume.values
+    return padded_samples(volume.values, dtype)
+
+
+def padded_samples(values: Numbers, dtype: np.dtype[Any] | None = None) -> Grid:
+    """Return a padded copy of samples (nz, ny, nx) for gathering, in `dtype` or their own type."""
+    nz, ny, nx = values.shape
+    padded = np.empty((nz + 2 * PAD, ny + 2 * PAD, nx + 2 * PAD), dtype or values.dtype)
+    padded[1:-1, 1:-1, 1:-1] = values
     for axis in range(3):
         planes = np.moveaxis(padded, axis, 0)
         planes[0], planes[-1] = planes[1], planes[-2]

@@ -8,7 +8,9 @@ import numpy as np
 
 from volref.arrays import Floats, Indices
 from volref.records import Surface
+from volref.scene.lights import Material
 from volref.scene.scene import Scene
+from volref.stages.lighting import brightest_lit
 from volref.truth.parts import Parts, runs
 
 # Pixels that are filled with what lies behind the volume, or with what it could be, at a time.
@@ -79,6 +81,10 @@ def _anything(scene: Scene, behind: Floats) -> tuple[Floats, Floats]:
     """Return pixels (R, 4) midway between all that the volume could show, and their bound (R,)."""
     if scene.volume is None or scene.transfer is None:
         return behind.copy(), np.zeros(len(behind))
-    most = np.maximum(behind, np.append(scene.transfer.colors.max(axis=0), 1.0))
+    brightest = scene.envelope.colors.max(axis=0)
+    if scene.lights_volume:
+        material = scene.material or Material()
+        brightest = np.array([brightest_lit(scene.lights, material, color) for color in brightest.tolist()])
+    most = np.maximum(behind, np.append(brightest, 1.0))
     least = np.append(np.zeros((len(behind), 3)), behind[:, 3:], axis=1)
     return (most + least) / 2, (most - least).max(axis=1) / 2

@@ -15,7 +15,8 @@ from volref.arrays import Floats, Indices
 from volref.planning import MOST_DEFAULT_SEGMENTS, Plan
 from volref.scene.scene import Scene
 from volref.truth.exact import Prepared, integrate_pixels
-from volref.truth.march import field_of, march_chunk
+from volref.truth.fields import field_of
+from volref.truth.march import march_chunk
 from volref.workspace import Workspace
 
 # Tiles to try, pixels on a side, and at most this share of the image.
@@ -103,8 +104,7 @@ def choose(scene: Scene, plan: Plan, prepared: Prepared, distance: Floats, behin
         typical = float(np.quantile(factor * around, 1 - MOST_LEFT))
         return _Tried(marching, factor, seconds + min(DEAR * left / busy, 1.0) * exactly, typical)
 
-    assert scene.volume is not None
-    voxel = min(scene.volume.spacing)
+    voxel = min(scene.gridded[0].spacing)
     step, best = FIRST_STEP, None
     for _ in range(TRIES):
         latest = tried(step * voxel)

@@ -19,6 +19,7 @@ from volref.errors import FormatError
 from volref.io.references import Folder, Message, VolumeReference, fetch_volume, pack, refer_to_volume, unpack
 from volref.planning import Plan
 from volref.scene.scene import Scene
+from volref.scene.volume import Volume
 from volref.truth.canvas import light_behind
 from volref.truth.integration import Integrated, Integration
 
@@ -28,25 +29,24 @@ class Errand:
     """An `Integration` on its way to another process; equal errands are the same work."""
 
     versions: str
-    volume: VolumeReference
+    volume: VolumeReference | None
     rest: Message
 
 
 def errand_of(integration: Integration, folder: Folder) -> Errand:
     """Return the errand of an integration whose scene has a volume; files go to `folder` if they must."""
     scene, plan = integration.scene, integration.plan
-    assert scene.volume is not None
     # Meshes stay: where they end the rays, and what colour they have, goes with each task.
-    view = {
-        name.name: getattr(scene, name.name)
-        for name in dataclasses.fields(scene)
-        if name.name not in ("volume", "meshes")
-    }
+    left = {"meshes"} | ({"volume"} if isinstance(scene.volume, Volume) else set())
+    fields = [field.name for field in dataclasses.fields(scene) if field.name not in left]
+    view = {name: getattr(scene, name) for name in fields}
     decided = {
         field.name: getattr(plan, field.name) for field in dataclasses.fields(plan) if field.name != "scene"
     }
     message = pack((view, decided), folder)
-    return Errand(_versions(), refer_to_volume(scene.volume, folder), message)
+    # The sweeps of a radar are few: they go with the rest.
+    volume = refer_to_volume(scene.volume, folder) if isinstance(scene.volume, Volume) else None
+    return Errand(_versions(), volume, message)
 
 
 def run_errand(
@@ -89,7 +89,8 @@ def _integration(errand: Errand) -> Integration:
     if errand.versions != _versions():
         message = f"workers must have {errand.versions} as their client has, got {_versions()} on "
         raise FormatError(message + f"{socket.gethostname()}; install the same versions everywhere")
-    errand.volume.file.checked()  # also if it was read before
+    if errand.volume is not None:
+        errand.volume.file.checked()  # also if it was read before
     with _READING:
         return _made_ready(errand)
 
@@ -97,7 +98,9 @@ def _integration(errand: Errand) -> Integration:
 @lru_cache(maxsize=2)
 def _made_ready(errand: Errand) -> Integration:
     view, decided = unpack(errand.rest)
-    scene = Scene(fetch_volume(errand.volume), **view)
+    if errand.volume is not None:
+        view["volume"] = fetch_volume(errand.volume)
+    scene = Scene(**view)
     integration = Integration(scene, Plan(scene=scene, **decided))
     integration.make_ready()
     return integration

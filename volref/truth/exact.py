@@ -69,9 +69,7 @@ class Prepared:
 
 def prepare(scene: Scene, plan: Plan) -> Prepared:
     """Return the volume of `scene` made ready; costs a few passes over its voxels."""
-    volume, transfer = scene.volume, scene.transfer
-    assert volume is not None
-    assert transfer is not None
+    volume, transfer = scene.gridded
     grid = grid_of(volume)
     shift, near_shift = (1, 2) if volume.values.size <= FINE_FLAGS else (2, 3)
     half = 1 << (near_shift - 1)

@@ -17,7 +17,8 @@ from volref.scene.scene import Scene
 from volref.stages.rays import pixel_rays
 from volref.stages.spans import clip_spans
 from volref.truth.exact import Prepared, integrate_pixels, prepare
-from volref.truth.march import Field, field_of, march_chunk
+from volref.truth.fields import Field, field_of
+from volref.truth.march import march_chunk
 from volref.workspace import Workspace
 
 

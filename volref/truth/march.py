@@ -20,7 +20,6 @@ one come first:
     ray 2   . . . . # . .                         4
 """
 
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
@@ -32,11 +31,12 @@ from volref.planning import Plan
 from volref.records import Spans
 from volref.scene.scene import Scene
 from volref.scene.transform import transform_directions, transform_points
-from volref.stages.classify import Table, classify, lookup_table, segment_opacity
+from volref.stages.classify import segment_opacity
 from volref.stages.composite import composite_block, composite_block_coarse, over
 from volref.stages.rays import pixel_rays
-from volref.stages.sampling import PAD, Grid, grid_of, trilinear
+from volref.stages.sampling import PAD
 from volref.stages.spans import box_spans, cut_spans
+from volref.truth.fields import Field, Samples
 from volref.truth.skipping import blocks_to_march
 from volref.workspace import Workspace
 
@@ -45,41 +45,6 @@ BATCH = 147456
 
 # Rays that have ended early are dropped when they are more than this part of those at work.
 MOST_ENDED = 1 / 8
-
-
-@dataclass(frozen=True, eq=False)
-class Field:
-    """A volume made ready to be sampled and classified along rays.
-
-    reach: more indices than a block of segments goes along any axis.
-    """
-
-    grid: Grid
-    table: Table
-    index_from_world: Floats
-    low: Floats
-    high: Floats
-    color_limit: float
-    reach: int
-
-
-def field_of(scene: Scene, plan: Plan) -> Field:
-    """Prepare the volume of `scene` for marching; the first time it costs one pass over its voxels."""
-    volume, transfer = scene.volume, scene.transfer
-    assert volume is not None
-    assert transfer is not None
-    low, high = volume.index_bounds
-    return Field(
-        grid_of(volume, plan.precision),
-        lookup_table(
-            transfer, volume.value_bounds, colors=plan.palette.looked_up, dtype=np.dtype(plan.precision)
-        ),
-        volume.index_from_world,
-        low,
-        high,
-        float(transfer.colors.max()),
-        math.ceil(plan.step * plan.block * np.linalg.norm(volume.index_from_world[:3, :3], axis=1).max()) + 1,
-    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,8 +58,9 @@ class Chunk:
 
 @dataclass(eq=False)
 class _State:
-    """Rays at work: where they start and how far a segment goes (3, R) in padded index space, and sums.
+    """Rays at work: where they start and how far a segment goes (3, R) in the padded space of the field.
 
+    viewer (3, R): the unit world direction towards the viewer, or (0, R) if the field does not ask for it.
     number (R,): which ray of the chunk it is.  length (R,): of a segment, in the world.  segments (R,): how
     many there are.  blocks (R,): how many of its blocks are marched; rays are sorted by it.  first (b, R):
     the first segment of each of them.  coarse_transmittance and coarse_color are those at three times the
@@ -104,6 +70,7 @@ class _State:
     number: Indices
     start: Floats
     stride: Floats
+    viewer: Floats
     length: Floats
     segments: Indices
     blocks: Indices
@@ -136,11 +103,12 @@ def march_chunk(
     """
     rays = pixel_rays(scene.camera, scene.width, scene.height, pixels)
     eyes = rays.origins if scene.camera.is_parallel else rays.origins[:1]
-    origins = transform_points(field.index_from_world, eyes).T
-    directions = transform_directions(field.index_from_world, rays.directions).T
+    origins = transform_points(field.space_from_world, eyes).T
+    directions = transform_directions(field.space_from_world, rays.directions).T
     origins = np.broadcast_to(origins, directions.shape)
     spans = cut_spans(box_spans(origins, directions, field.low, field.high), begin, distance)
-    state = _state_of(plan, field, origins, directions, spans)
+    viewer = -rays.directions.T if field.sees_viewer else np.empty((0, len(pixels)))
+    state = _state_of(plan, field, origins, directions, spans, viewer)
     rgba, bound, samples = behind.copy(), np.zeros(len(pixels)), 0
     for part in _marched(plan, field, state, work):
         samples += int(part.blocks.sum()) * plan.block
@@ -166,7 +134,9 @@ def segments_of(spans: Spans, step: float) -> tuple[Indices, Floats]:
     return counts, length / np.maximum(counts, 1)
 
 
-def _state_of(plan: Plan, field: Field, origins: Floats, directions: Floats, spans: Spans) -> _State:
+def _state_of(
+    plan: Plan, field: Field, origins: Floats, directions: Floats, spans: Spans, viewer: Floats
+) -> _State:
     """Return the rays that have something to march, sorted, before anything is marched."""
     segments, length = segments_of(spans, plan.step)
     start = directions * np.where(segments > 0, spans.t_near, 0.0)
@@ -174,12 +144,13 @@ def _state_of(plan: Plan, field: Field, origins: Floats, directions: Floats, spa
     start += PAD
     stride = directions * length
     blocks, order, first = blocks_to_march(plan, start, stride, segments)
-    kind = field.table.start.dtype
+    kind = field.dtype
     count, channels = len(order), plan.palette.composited
     return _State(
         order,
         start.take(order, axis=1),
         stride.take(order, axis=1),
+        viewer.take(order, axis=1),
         length.take(order).astype(kind),
         segments.take(order),
         blocks.take(order),
@@ -244,6 +215,7 @@ def _march_batch(
     position: Floats = work.get("position", 3 * plan.block * total, kind).reshape(3, *shape)
     lengths: Floats = work.get("lengths", total, kind)
     whole: Indices = work.get("corners", 3 * total, np.int32).reshape(3, total)
+    viewer: Floats = work.get("viewer", len(state.viewer) * total).reshape(-1, total)
     begin = 0
     for number, count in enumerate(counts[:-1], start=row):
         columns = slice(begin, begin + count)
@@ -254,11 +226,11 @@ def _march_batch(
         for place, offset, begin_at in zip(position, offsets, corner.astype(kind), strict=True):
             np.add(offset[:, :count], begin_at, out=place[:, columns])
         lengths[columns] = state.length[:count]
+        viewer[:, columns] = state.viewer[:, :count]
         begin += count
     whole -= field.reach
-    values = trilinear(field.grid, position.reshape(3, -1), work, whole)
-    colors, strength = classify(field.table, values, work)
-    opacity = segment_opacity(field.table, strength.reshape(shape), lengths)
+    colors, strength = field.look(Samples(position.reshape(3, -1), whole, viewer), work)
+    opacity = segment_opacity(field, strength.reshape(shape), lengths)
     colors = colors.reshape(len(colors), *shape)
     begin = 0
     for number, (count, others) in enumerate(pairwise(counts), start=row):

@@ -22,7 +22,8 @@ from volref.stages.rays import pixel_rays
 from volref.stages.sampling import PAD, trilinear
 from volref.stages.spans import box_spans, cut_spans
 from volref.truth.canvas import light_behind
-from volref.truth.march import Field, field_of, segments_of
+from volref.truth.fields import PlainField, plain_field
+from volref.truth.march import segments_of
 from volref.truth.rendering import decide
 from volref.truth.surfaces import visible_surface
 from volref.workspace import Workspace
@@ -124,9 +125,9 @@ def _surface_words(surface: Surface | None, x: int, y: int) -> dict[str, Any] | 
 
 def _trace_volume(scene: Scene, plan: Plan, rays: Rays, distance: float, head: dict[str, Any]) -> Trace:
     """Trace one ray through the volume of `scene` up to a surface `distance` away, +inf without one."""
-    field = field_of(scene, plan.everything())
-    origin = transform_points(field.index_from_world, rays.origins).T
-    direction = transform_directions(field.index_from_world, rays.directions).T
+    field = plain_field(scene, plan.everything())
+    origin = transform_points(field.space_from_world, rays.origins).T
+    direction = transform_directions(field.space_from_world, rays.directions).T
     box = box_spans(origin, direction, field.low, field.high)
     spans = cut_spans(box, 0.0, np.array([distance]))
     t_near, t_far = float(spans.t_near[0]), float(spans.t_far[0])
@@ -162,12 +163,14 @@ def _checked_pixel(scene: Scene, pixel: Sequence[int]) -> tuple[int, int]:
     return x, whole_number("pixel y", pixel[1], low=0, high=scene.height - 1)
 
 
-def _table(scene: Scene, field: Field, start: Floats, length: Floats, index: Floats) -> dict[str, Numbers]:
+def _table(
+    scene: Scene, field: PlainField, start: Floats, length: Floats, index: Floats
+) -> dict[str, Numbers]:
     """Return the columns of the segments that begin at `start` (S,), but for `position` and `t_end`.
 
     `index` (3, S) are their samples in index space.
     """
-    assert scene.volume is not None
+    volume, _ = scene.gridded
     work = Workspace()
     t = start + length / 2
     cell = np.floor(index)
@@ -189,7 +192,7 @@ def _table(scene: Scene, field: Field, start: Floats, length: Floats, index: Flo
         "index": index.T,
         "cell": cell.T.astype(np.int64),
         "fraction": (index - cell).T,
-        "corners": _corner_samples(scene.volume.values, cell.T.astype(np.int64)),
+        "corners": _corner_samples(volume.values, cell.T.astype(np.int64)),
         "value": value.copy(),
         "color": color.T.copy(),
         "strength": strength.copy(),

@@ -14,6 +14,7 @@ import numpy as np
 
 from volref.arrays import Booleans, Floats, Indices, Integers, whole_number
 from volref.errors import SceneError
+from volref.planning import sampled_because
 from volref.scene.scene import Scene
 from volref.scene.transform import transform_directions, transform_points
 from volref.stages.rays import pixel_rays
@@ -212,6 +213,11 @@ def verify(
     if scene.volume is None or scene.transfer is None:
         message = "scene must have a volume to verify, got meshes only; compare their images instead"
         raise SceneError(message)
+    more = sampled_because(scene) or (f"mode {scene.mode!r}" if scene.mode != "composite" else "")
+    more = more or ("clipping planes" if scene.clip else "")
+    if more:
+        message = f"scene must be emission and absorption of values on a grid to be verified, got {more}; "
+        raise SceneError(message + "verify one without")
     size = scene.height, scene.width
     if out.rgba.shape[:2] != size:
         message = f"out must be an image of the scene, {size[1]} x {size[0]} pixels, got "
@@ -241,14 +247,13 @@ def _integrate_again(
     scene: Scene, out: Render, chosen: Indices, digits: int, progress: Progress | None
 ) -> tuple[Floats, Floats, Floats]:
     """Return the truth (N, 4), the error of the image and the truth's own remainder at `chosen` (N,)."""
-    assert scene.volume is not None
-    assert scene.transfer is not None
+    volume, transfer = scene.gridded
     behind = light_behind(scene, visible_surface(scene) if scene.meshes else None, chosen)
     distance, image = out.distance.reshape(-1)[chosen], out.rgba.reshape(-1, 4)[chosen]
     truth, error, remainder = np.empty(image.shape), np.empty(len(chosen)), np.empty(len(chosen))
     for i, ray in enumerate(_index_rays(scene, chosen)):
         end, light = float(distance[i]), behind[i].tolist()
-        found = ray_integral(scene.volume, scene.transfer, *ray, end, light, digits)
+        found = ray_integral(volume, transfer, *ray, end, light, digits)
         difference = [float(abs(a - b)) for a, b in zip(found.rgba, image[i].tolist(), strict=True)]
         # NumPy's maximum keeps a NaN of the image, Python's may lose it.
         truth[i], error[i] = [float(channel) for channel in found.rgba], np.max(difference)
@@ -266,8 +271,7 @@ def _check_mpmath() -> None:
 
 def _random_pixels(scene: Scene, distance: Floats, rays: int, seed: int) -> Indices:
     """Return up to `rays` flat pixels whose rays meet the volume, in random order."""
-    assert scene.volume is not None
-    low, high = (exact_point(corner.tolist()) for corner in scene.volume.index_bounds)
+    low, high = (exact_point(corner.tolist()) for corner in scene.gridded[0].index_bounds)
     order = np.random.default_rng(seed).permutation(scene.width * scene.height)
     meeting = (
         pixel
@@ -292,9 +296,8 @@ def _flat_pixels(scene: Scene, pixels: Sequence[tuple[int, int]]) -> Indices:
 
 def _index_rays(scene: Scene, pixels: Indices) -> Iterator[tuple[list[float], list[float]]]:
     """Yield origin and direction in index space: the float64 rays that every integrator starts from."""
-    assert scene.volume is not None
     rays = pixel_rays(scene.camera, scene.width, scene.height, pixels)
-    matrix = scene.volume.index_from_world
+    matrix = scene.gridded[0].index_from_world
     origins = transform_points(matrix, rays.origins)
     directions = transform_directions(matrix, rays.directions)
     yield from zip(origins.tolist(), directions.tolist(), strict=True)

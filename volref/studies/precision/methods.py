@@ -76,8 +76,7 @@ class Method:
 
 
 def _least_spacing(scene: Scene) -> float:
-    assert scene.volume is not None
-    return min(scene.volume.spacing)
+    return min(scene.gridded[0].spacing)
 
 
 def _marched(scene: Scene, step: float) -> Answer:

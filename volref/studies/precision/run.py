@@ -130,7 +130,7 @@ def study_scene(
         subject.meaning,
         scene.width,
         scene.height,
-        scene.volume.size,
+        scene.gridded[0].size,
         float(reference.bound.max()),
         tuple(points),
         tuple(stopped),

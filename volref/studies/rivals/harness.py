@@ -116,8 +116,8 @@ def _chunk(
     behind = light_behind(scene, surface, pixels)
     field = medium.field
     rays = pixel_rays(scene.camera, scene.width, scene.height, pixels)
-    origins = transform_points(field.index_from_world, rays.origins).T
-    directions = transform_directions(field.index_from_world, rays.directions).T
+    origins = transform_points(field.space_from_world, rays.origins).T
+    directions = transform_directions(field.space_from_world, rays.directions).T
     spans = box_spans(origins, directions, field.low, field.high)
     if surface is not None:
         spans = cut_spans(spans, 0.0, surface.distance.reshape(-1)[pixels])

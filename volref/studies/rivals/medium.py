@@ -17,7 +17,7 @@ from volref.scene.transfer import TransferFunction
 from volref.scene.volume import Volume
 from volref.stages.classify import Table, classify
 from volref.stages.sampling import trilinear
-from volref.truth.march import Field, field_of
+from volref.truth.fields import PlainField, plain_field
 from volref.workspace import Workspace
 
 # Extinction, per unit distance, of an opacity of 1, for rules that need a number: opaque at 4e-5 of it.
@@ -28,7 +28,7 @@ OPAQUE = 2.0**20
 class Medium:
     """A field with its transfer function: ready to be sampled, and as they were given."""
 
-    field: Field
+    field: PlainField
     volume: Volume
     transfer: TransferFunction
 
@@ -57,9 +57,7 @@ Integrator: TypeAlias = Callable[[Bundle, Workspace], Light]
 
 def medium_of(scene: Scene) -> Medium:
     """Prepare the volume of `scene` for the rivals."""
-    assert scene.volume is not None
-    assert scene.transfer is not None
-    return Medium(field_of(scene, plan(scene, method="march").everything()), scene.volume, scene.transfer)
+    return Medium(plain_field(scene, plan(scene, method="march").everything()), *scene.gridded)
 
 
 def steepest_slope(volume: Volume) -> float:

@@ -29,17 +29,14 @@ def shader_image(
     `values` take the place of the volume's, for samples that a volume refuses.  `riemann` takes
     extinction x length for the opacity.
     """
-    assert scene.volume is not None
-    samples = scene.volume.values if values is None else values
+    samples = scene.gridded[0].values if values is None else values
     with np.errstate(all="ignore"):
         pixels = _march(scene, samples.astype(F4), F4(step), most_steps, riemann=riemann)
         return pixels.astype(np.float64)
 
 
 def _march(scene: Scene, values: Numbers, step: np.float32, most_steps: int, *, riemann: bool) -> Numbers:
-    volume, transfer = scene.volume, scene.transfer
-    assert volume is not None
-    assert transfer is not None
+    volume, transfer = scene.gridded
     rays = pixel_rays(scene.camera, scene.width, scene.height, np.arange(scene.width * scene.height))
     spacing = np.array(volume.spacing, F4)
     origin = (rays.origins.astype(F4) - np.array(volume.origin, F4)) / spacing

@@ -44,9 +44,9 @@ def _needle_along() -> Measured:
 def _moved(shift: float) -> tuple[Scene, Floats]:
     """Return a ramp `shift` away from the world's origin along each axis, and its image at the origin."""
     scene, pixels = ramp_scene(8, 8, transfer=two_colors(), camera=_nearby(0.0))
-    assert scene.volume is not None
-    origin = tuple(o + shift for o in scene.volume.origin)
-    volume = Volume(scene.volume.values, scene.volume.spacing, origin, centering="node")
+    ramp, _ = scene.gridded
+    origin = tuple(o + shift for o in ramp.origin)
+    volume = Volume(ramp.values, ramp.spacing, origin, centering="node")
     return dataclasses.replace(scene, volume=volume, camera=_nearby(shift)), pixels
 
 
