@@ -7,7 +7,13 @@ from hypothesis import strategies as st
 
 from volref.records import Rays
 from volref.scene.mesh import Mesh
-from volref.stages.surface import meet_triangles, surface_colors, texture_colors
+from volref.stages.surface import (
+    back_sides,
+    meet_triangles,
+    surface_colors,
+    surface_normals,
+    texture_colors,
+)
 
 EPS = np.finfo(np.float64).eps
 DOWN = np.array([[0.0, 0.0, -1.0]])
@@ -176,3 +182,32 @@ def test_a_coordinate_just_below_zero_repeats_without_leaving_the_texture():
     uv = np.array([[0.25 - 1e-17, 0.5], [-1e-300, 0.5], [np.nextafter(0.25, 0), 0.5]])
     # The last one is 4 x 2^-55 texels before the centre of texel 0, towards texel 1 on its other side.
     np.testing.assert_allclose(texture_colors(texture, uv, "repeat")[:, 0], [1, 2, 1], rtol=0, atol=4 * EPS)
+
+
+def test_normals_of_length_one_whatever_the_size_of_triangles_and_vectors():
+    for size in (1e-60, 1e-30, 1.0, 1e50):
+        mesh = Mesh(size * RIGHT_TRIANGLE[0], [(0, 1, 2)])
+        assert surface_normals(mesh, np.array([0]), np.full((1, 3), 1 / 3)).tolist() == [[0.0, 0.0, 1.0]]
+    tilted = np.array([(1e-200, 0, 0), (0, 3e50, 4e50), (0, 0, -1)])
+    mesh = Mesh(RIGHT_TRIANGLE[0], [(0, 1, 2)], normals=tilted)
+    found = surface_normals(mesh, np.zeros(3, int), np.eye(3))
+    np.testing.assert_allclose(found, [(1, 0, 0), (0, 0.6, 0.8), (0, 0, -1)], rtol=0, atol=2 * EPS)
+
+
+def test_vertex_normals_that_cancel_leave_none():
+    mesh = Mesh(RIGHT_TRIANGLE[0], [(0, 1, 2)], normals=[(0, 0, 1), (0, 0, -2), (1, 0, 0)])
+    assert surface_normals(mesh, np.array([0]), np.array([[0.5, 0.5, 0.0]])).tolist() == [[0.0, 0.0, 0.0]]
+
+
+def test_the_front_is_the_side_from_which_the_corners_run_counter_clockwise():
+    both = np.concatenate([RIGHT_TRIANGLE, RIGHT_TRIANGLE[:, ::-1]])
+    assert back_sides(both, np.tile(DOWN, (2, 1))).tolist() == [False, True]
+    edge_on = np.array([[1.0, 0.0, 0.0]] * 2)
+    assert back_sides(both, edge_on).tolist() == [False, False]
+
+
+def test_colours_with_alpha_are_interpolated_straight():
+    colors = [(1, 0, 0, 1), (0, 1, 0, 0), (0, 0, 1, 0.5)]
+    mesh = Mesh(RIGHT_TRIANGLE[0], [(0, 1, 2)], colors, coloring="vertex")
+    found = surface_colors(mesh, np.array([0]), np.array([[0.5, 0.25, 0.25]]))
+    assert found.tolist() == [[0.5, 0.25, 0.25, 0.625]]
