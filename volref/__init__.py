@@ -28,6 +28,7 @@ if TYPE_CHECKING:
         load_radar,
         load_raw,
         load_scene,
+        load_series,
         load_transfer,
         load_volume,
         read_image,
@@ -62,6 +63,7 @@ if TYPE_CHECKING:
     from volref.tonemap import tone_map
     from volref.truth.rendering import render
     from volref.truth.result import Render
+    from volref.truth.series import render_series
     from volref.truth.supersampling import supersample
     from volref.truth.tracing import Trace, trace
     from volref.truth.verification import Verification, verify
@@ -102,11 +104,13 @@ __all__ = [
     "load_radar",
     "load_raw",
     "load_scene",
+    "load_series",
     "load_transfer",
     "load_volume",
     "plan",
     "read_image",
     "render",
+    "render_series",
     "save_camera",
     "save_mesh",
     "save_radar",
@@ -145,6 +149,7 @@ _HOMES = {
     "volref.scene.arcball": ("arcball_rotation", "drag"),
     "volref.tonemap": ("tone_map",),
     "volref.truth.rendering": ("render",),
+    "volref.truth.series": ("render_series",),
     "volref.truth.supersampling": ("supersample",),
     "volref.truth.result": ("Render",),
     "volref.truth.tracing": ("Trace", "trace"),

@@ -13,6 +13,7 @@ from volref.io.png import write_png
 from volref.io.radar.door import load_radar, save_radar
 from volref.io.raw import load_raw
 from volref.io.scenes import load_scene, save_scene
+from volref.io.series import load_series
 from volref.io.transfer import load_preset, load_transfer, save_transfer
 from volref.io.volumes import load_volume
 
@@ -28,6 +29,7 @@ __all__ = [
     "load_radar",
     "load_raw",
     "load_scene",
+    "load_series",
     "load_transfer",
     "load_volume",
     "read_image",

@@ -76,8 +76,7 @@ class Series:
             If the time lies outside, or "linear" is asked of volumes that lie in different places.
         """
         one_of("interpolation", interpolation, INTERPOLATIONS)
-        low, high = float(self.times[0]), float(self.times[-1])
-        moment = number("time", time, low=low, high=high)
+        moment = self.checked_time(time)
         after = min(bisect.bisect_left(self.times, moment), len(self.times) - 1)
         if self.times[after] == moment:
             return self._volume(after)
@@ -86,6 +85,10 @@ class Series:
             return self._volume(after - (moment - first <= second - moment))
         weight = (moment - first) / (second - first)
         return mixed(self._volume(after - 1), self._volume(after), weight)
+
+    def checked_time(self, time: float) -> float:
+        """Return a time after checking that the series spans it."""
+        return number("time", time, low=float(self.times[0]), high=float(self.times[-1]))
 
     def _volume(self, i: int) -> Frame:
         given = self.volumes[i]
