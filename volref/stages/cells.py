@@ -15,6 +15,7 @@ Cells that cannot be seen are dropped before their cubic is made.
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 
@@ -33,6 +34,10 @@ SPLITTER = 2.0**27 + 1
 
 # A ray that moves less than this many indices along an axis over its whole length is taken as parallel.
 PARALLEL = 2.0**-60
+
+
+# Tells of cells, by their rays (n,) and padded indices along x, y and z, whether they matter (n,).
+Wanted: TypeAlias = Callable[[Indices, list[Numbers]], Booleans]
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,17 +67,38 @@ def cells_along(
     rests (3, R) is what rounding took off the origins.  `precise` asks for a tight bound on the error, at
     some cost.
     """
+    return placed_cells(grid, origins, rests, directions, spans, precise=precise)[0]
+
+
+def placed_cells(
+    grid: CellGrid,
+    origins: Floats,
+    rests: Floats,
+    directions: Floats,
+    spans: Spans,
+    *,
+    precise: bool,
+    wanted: Wanted | None = None,
+) -> tuple[Pieces, Floats]:
+    """Return the pieces as `cells_along` does, and t in the middle of each (n,).
+
+    `wanted` tells of cells, by their ray and their padded indices along x, y and z, whether their pieces are
+    to be made; without it those are whose block can be seen.
+    """
     rays, t_near, t_far = _near_part(grid, origins, directions, spans)
     if len(rays) == 0:
         nothing = np.empty(0)
-        return Pieces(rays, nothing, np.empty((4, 0)), nothing, nothing, rays, nothing)
+        return Pieces(rays, nothing, np.empty((4, 0)), nothing, nothing, rays, nothing), nothing
     error = position_error(grid, origins, directions, spans)[rays]
     origins, directions, rests = origins[:, rays], directions[:, rays], rests[:, rays]
     ray, length, middle = _between_planes(origins, directions, t_near, t_far)
     direction = [d.take(ray) for d in directions]
     positions = [d * middle + o.take(ray) for o, d in zip(origins, direction, strict=True)]
     wholes = [position.astype(np.int32) for position in positions]
-    chosen = np.flatnonzero(_lookup(grid.seen, wholes, grid.shift))
+    if wanted is None:
+        chosen = np.flatnonzero(of_blocks(grid.seen, wholes, grid.shift))
+    else:
+        chosen = np.flatnonzero(wanted(rays.take(ray), wholes))
     ray, length = ray.take(chosen), length.take(chosen)
     wholes = [whole.take(chosen) for whole in wholes]
     fractions = [position.take(chosen) - whole for position, whole in zip(positions, wholes, strict=True)]
@@ -88,7 +114,8 @@ def cells_along(
     share[on_plane.any(axis=0)] = np.inf
     astray = np.minimum(share.take(ray) / length, 1.0)
     n = len(ray)
-    return Pieces(rays.take(ray), length, cubic, slack, astray, np.full(n, -1, np.intp), np.zeros(n))
+    row = np.full(n, -1, np.intp)
+    return Pieces(rays.take(ray), length, cubic, slack, astray, row, np.zeros(n)), middle.take(chosen)
 
 
 def position_error(grid: CellGrid, origins: Floats, directions: Floats, spans: Spans) -> Floats:
@@ -204,12 +231,13 @@ def _between_planes(
     return ray, length, edges.reshape(-1).take(flat) + 0.5 * length
 
 
-def _lookup(flags: Booleans, wholes: list[Numbers], shift: int) -> Booleans:
+def of_blocks(values: Numbers, wholes: list[Numbers], shift: int) -> Numbers:
+    """Return the value (n,) of the block of each cell, of `values` laid out as `CellGrid.seen`."""
     index = np.zeros(len(wholes[0]), np.int32)
-    for axis, blocks in zip((2, 1, 0), flags.shape, strict=True):
+    for axis, blocks in zip((2, 1, 0), values.shape, strict=True):
         index *= blocks
         index += (wholes[axis] + ((1 << shift) - 1)) >> shift
-    return np.asarray(flags.reshape(-1).take(index, mode="clip"))
+    return np.asarray(values.reshape(-1).take(index, mode="clip"))
 
 
 def _cubic(
