@@ -10,10 +10,11 @@ from PIL import Image
 
 from volref.errors import FormatError
 from volref.io import load_transfer, save_transfer
-from volref.scene import TransferFunction
+from volref.io.transfer_json import document_of_transfer, transfer_of_document
+from volref.scene import TransferFunction, TransferFunction2D
 
 unit = st.floats(0, 1)
-FIELDS = ("values", "colors", "extinction", "opacity")
+FIELDS = ("values", "colors", "extinction", "opacity", "gradient_opacity")
 
 
 @st.composite
@@ -24,21 +25,59 @@ def transfers(draw):
     amounts = draw(st.lists(unit, min_size=count, max_size=count))
     length = draw(st.floats(1e-3, 1e3))
     kind = draw(st.sampled_from(["opacity", "extinction"]))
-    return TransferFunction(values, colors, **{kind: amounts}, unit_distance=length)
+    more = {"units": draw(st.sampled_from(["", "HU", "dBZ", "normalised"]))}
+    if draw(st.booleans()):
+        more["gradient_opacity"] = ([0, length, length], draw(st.tuples(unit, unit, unit)))
+    return TransferFunction(values, colors, **{kind: amounts}, unit_distance=length, **more)
 
 
 def assert_same(one, other):
     for name in FIELDS:
         assert np.array_equal(getattr(one, name), getattr(other, name))
-    assert (one.interpolation, one.unit_distance) == (other.interpolation, other.unit_distance)
+    for name in ("interpolation", "unit_distance", "units"):
+        assert getattr(one, name) == getattr(other, name)
 
 
 @given(transfers())
 def test_json_keeps_every_number_bit_for_bit(tmp_path_factory, transfer):
     path = tmp_path_factory.mktemp("tf") / "tf.json"
-    save_transfer(transfer, path, units="HU")
+    save_transfer(transfer, path)
     assert_same(load_transfer(path), transfer)
-    assert json.loads(path.read_text())["units"] == "HU"
+    assert json.loads(path.read_text()).get("units", "") == transfer.units
+
+
+def table_2d(rows=3, columns=5):
+    rgba = np.random.default_rng(8).random((rows, columns, 4))
+    return TransferFunction2D(rgba, (-1000.1, 3000), (0, 1 / 3), 0.7, units="HU")
+
+
+def assert_same_2d(one, other):
+    assert np.array_equal(one.rgba, other.rgba)
+    for name in ("value_domain", "magnitude_domain", "unit_distance", "units"):
+        assert getattr(one, name) == getattr(other, name)
+
+
+def test_a_table_of_two_dimensions_is_kept_bit_for_bit_in_a_file_beside_the_json(tmp_path):
+    save_transfer(table_2d(), tmp_path / "bones.json")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["bones.json", "bones.rgba.npy"]
+    assert_same_2d(load_transfer(tmp_path / "bones.json"), table_2d())
+    with pytest.raises(FormatError, match="must not exist yet"):
+        save_transfer(table_2d(), tmp_path / "bones.json")
+
+
+def test_a_table_of_two_dimensions_may_stand_in_the_json(tmp_path):
+    document = {"format": "volref-transfer", "format_version": 1, **document_of_transfer(table_2d())}
+    assert_same_2d(load(tmp_path, document), table_2d())
+    with pytest.raises(FormatError, match="rgba_file must lie beside a file"):
+        transfer_of_document({"value_domain": [0, 1], "rgba_file": "x.npy"})
+
+
+def test_the_file_beside_may_not_lie_elsewhere(tmp_path):
+    save_transfer(table_2d(), tmp_path / "bones.json")
+    document = json.loads((tmp_path / "bones.json").read_text()) | {"rgba_file": "../bones.rgba.npy"}
+    (tmp_path / "inner").mkdir()
+    with pytest.raises(FormatError, match="must stay inside the folder"):
+        load(tmp_path / "inner", document)
 
 
 def document(**change):
@@ -79,6 +118,19 @@ def test_a_table_is_placed_as_from_lut_does(tmp_path, name):
         assert_same(
             load_transfer(path, domain=(-10, 50), **options),
             TransferFunction.from_lut(codes, (-10, 50), **options),
+        )
+
+
+def test_a_table_of_rows_is_one_of_value_and_magnitude(tmp_path):
+    codes = np.random.default_rng(3).integers(0, 255, (4, 6, 4), np.uint8)
+    np.save(tmp_path / "t.npy", codes)
+    found = load_transfer(tmp_path / "t.npy", domain=(0, 255), magnitude_domain=(0, 60), units="codes")
+    assert_same_2d(found, TransferFunction2D(codes, (0, 255), (0, 60), units="codes"))
+    with pytest.raises(FormatError, match="must be given a magnitude_domain, got none for a table of 4 rows"):
+        load_transfer(tmp_path / "t.npy", domain=(0, 255))
+    with pytest.raises(FormatError, match="without interpolation"):
+        load_transfer(
+            tmp_path / "t.npy", domain=(0, 255), magnitude_domain=(0, 60), interpolation="extinction"
         )
 
 

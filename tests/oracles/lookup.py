@@ -75,3 +75,21 @@ def catmull_rom(at, points, x):
         + (-2 * u**3 + 3 * u**2) * points[i + 1]
         + (u**3 - u**2) * h * slope(i + 1)
     )
+
+
+def vpt_canvas(bumps, size, *, rounded, blend):
+    """VPT's bumps, pixel by pixel: the fragment shader, then the blending of a canvas of 8 bits or floats."""
+    canvas = [[[0.0] * 4 for _ in range(size)] for _ in range(size)]
+    for bump in bumps:
+        position, extent, color = bump["position"], bump["size"], bump["color"]
+        for row in range(size):
+            for column in range(size):
+                x = (position["x"] - (column + 0.5) / size) / extent["x"]
+                y = (position["y"] - (row + 0.5) / size) / extent["y"]
+                source = [min(max(color[c] * math.exp(-(x * x + y * y)), 0), 1) for c in "rgba"]
+                own = source[3] if blend == "source-alpha" else 1.0
+                for c in range(4):
+                    mixed = source[c] * own + canvas[row][column][c] * (1 - source[3])
+                    mixed = min(max(mixed, 0), 1)
+                    canvas[row][column][c] = round(mixed * 255) / 255 if rounded else mixed
+    return canvas

@@ -14,6 +14,7 @@ so over values 0..8 and magnitudes 0..2 the entry of row 1, column 3 lies at val
 """
 
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -134,3 +135,7 @@ class TransferFunction2D:
         [False, True]
         """
         return self.envelope.is_visible(low, high)
+
+
+# What a scene can be classified by.
+AnyTransfer: TypeAlias = TransferFunction | TransferFunction2D
