@@ -12,6 +12,9 @@ Item: TypeAlias = Volume | Mesh | TransferFunction | storms.PolarScan
 # The seeds' radars scan the sky every ten minutes.
 STORM_INTERVAL_S, STORM_SCANS = 600.0, 4
 
+# A series to play: close enough in time that a cell does not move farther than it is wide.
+SERIES_INTERVAL_S, SERIES_SCANS, SERIES_SIZE = 300.0, 9, (64, 64, 16)
+
 
 @dataclass(frozen=True)
 class Entry:
@@ -45,6 +48,14 @@ def _storm_boxes(seed: int) -> dict[str, Item]:
     }
 
 
+def _storm_series(seed: int) -> dict[str, Item]:
+    storm = storms.make_storm(seed)
+    return {
+        f"storm_series_{k:02d}": storms.sample_cartesian(storm, k * SERIES_INTERVAL_S, size=SERIES_SIZE)
+        for k in range(SERIES_SCANS)
+    }
+
+
 CATALOGUE: dict[str, Entry] = dict(
     [
         _one("homogeneous_box", "one value", fields.homogeneous_box),
@@ -64,6 +75,12 @@ CATALOGUE: dict[str, Entry] = dict(
             Entry("made-up storm, four radar volumes 10 minutes apart", seeded=True, make=_storm_scans),
         ),
         ("storm_box", Entry("the same storm on a box (dBZ)", seeded=True, make=_storm_boxes)),
+        (
+            "storm_series",
+            Entry(
+                "the same storm on a small box, nine times 5 minutes apart", seeded=True, make=_storm_series
+            ),
+        ),
         _one("box_mesh", "a closed box", meshes.box_mesh),
         _one("sphere_mesh", "a closed icosphere", meshes.sphere_mesh),
         _one("torus_mesh", "a closed torus", meshes.torus_mesh),

@@ -19,6 +19,7 @@ from volref.cli.options import (
     read_scene,
 )
 from volref.cli.output import note, print_json, progress
+from volref.cli.series import add_series, check_no_series, run_series
 from volref.cli.verb import DIFFERS, GOOD, Verb
 from volref.errors import FormatError
 
@@ -61,6 +62,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         help="integrate N random rays again at 30 digits, by another path, and compare (extra 'verify')",
     )
     add_display(parser)
+    add_series(parser)
     add_work(parser)
     add_dask(parser)
     add_force(parser)
@@ -70,6 +72,9 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 def _run(options: argparse.Namespace) -> int:
     from volref import render, supersample
 
+    if options.series is not None:
+        return run_series(options)
+    check_no_series(options)
     targets = [Path(name) for name in options.output]
     _check_targets(targets, force=options.force)
     check_display(options)
@@ -182,6 +187,10 @@ VERB = Verb(
         ("render scene.json -o look.png --step 1 --tolerance 1", "a quick march, its error estimated"),
         ("render scene.json -o smooth.png --supersample 4", "each pixel the mean of 4 x 4 rays"),
         ("render scene.json -o bright.png --tone-map hable --exposure 4", "strong light, filmed"),
+        (
+            "render scene.json --series scans/ --times 0:600 --interpolate 10 -o film.png",
+            "a film of the volumes in a folder, ten minutes apart, ten frames from each to the next",
+        ),
         ("render scene.json -o image.npy --dask local:4", "with four processes of this machine"),
         ("render scene.json -o image.npy --verify 64", "with 64 of its rays checked at 30 digits"),
     ),
