@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from tests.bad_files import BAD_FILES, CAMERA, TRIANGLE, png_bytes
+from tests.bad_formats import BAD_FORMATS
 from volref.errors import FormatError, SceneError
 from volref.io import load_mesh, load_scene, load_volume, read_image, save_mesh, save_scene, write_png
 from volref.scene import Camera, Mesh, Scene, TransferFunction, Volume
@@ -128,7 +129,7 @@ def assert_one_sentence(error, fragments):
     assert not missing, f"{missing} not in: {message}"
 
 
-@pytest.mark.parametrize("case", BAD_FILES, ids=lambda case: f"{case.kind}: {case.name}")
+@pytest.mark.parametrize("case", BAD_FILES + BAD_FORMATS, ids=lambda case: f"{case.kind}: {case.name}")
 def test_a_bad_file_is_refused_with_one_sentence(tmp_path, case):
     with pytest.raises((SceneError, FormatError)) as caught:
         case.load(tmp_path)
@@ -145,7 +146,7 @@ def test_a_bad_record_is_refused_with_one_sentence(action, fragments):
 
 
 def test_the_names_of_the_cases_are_different():
-    names = [(case.kind, case.name) for case in BAD_FILES]
+    names = [(case.kind, case.name) for case in BAD_FILES + BAD_FORMATS]
     assert len(set(names)) == len(names)
 
 

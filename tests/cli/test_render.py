@@ -116,7 +116,7 @@ def test_a_file_that_exists_is_kept_unless_forced(scene_file, tmp_path, capsys):
 @pytest.mark.parametrize(
     ("outputs", "words"),
     [
-        (["image.jpg"], "must end in .png, .npy, .npz, got '.jpg'"),
+        (["image.jpg"], "must end in .png, .exr, .npy, .npz, got '.jpg'"),
         (["image"], "must end in"),
         (["nowhere/image.png"], "a folder that exists"),
         (["image.png", "image.png"], "must be named once"),
