@@ -9,9 +9,14 @@ from volref.cli.verb import GOOD, Verb
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
-        "source", metavar="SRC", help="a volume: .npy .npz .nrrd .nhdr .nii .nii.gz .raw .bin .png"
+        "source",
+        metavar="SRC",
+        help="a volume: .npy .npz .nrrd .nhdr .nii .nii.gz .mha .mhd .dcm (or a folder) .tif .h5 .zarr "
+        ".zarr.zip .bvp .raw .bin .png",
     )
-    parser.add_argument("target", metavar="DST", help="file to write: .npy .npz .nrrd .nii .nii.gz .raw .png")
+    parser.add_argument(
+        "target", metavar="DST", help="file to write: .npy .npz .nrrd .nii .nii.gz .mha .h5 .raw .png"
+    )
     add_statements(parser, "SRC")
     parser.add_argument(
         "--nan",
