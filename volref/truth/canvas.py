@@ -7,10 +7,12 @@ parts: a 4096 x 4096 image of four channels takes 512 MiB.
 import numpy as np
 
 from volref.arrays import Floats, Indices
-from volref.records import Surface
+from volref.records import Layers, Surface
 from volref.scene.lights import Material
 from volref.scene.scene import Scene
 from volref.stages.lighting import brightest_lit
+from volref.truth.layered import integrate_layered
+from volref.truth.layers import visible_layers
 from volref.truth.parts import Parts, runs
 
 # Pixels that are filled with what lies behind the volume, or with what it could be, at a time.
@@ -20,12 +22,16 @@ PIXELS_AT_ONCE = 1 << 14
 class Canvas:
     """Pixels being filled in: rgba (H W, 4), bound (H W,), distance (H W,), and the work spent so far.
 
-    A pixel that nothing is known of has an infinite bound.
+    A pixel that nothing is known of has an infinite bound.  `layers` are those of all pixels, None if no mesh
+    is transparent.
     """
 
     def __init__(self, scene: Scene, surface: Surface | None) -> None:
         pixels = scene.width * scene.height
         self.scene, self.surface = scene, surface
+        self.layers = None
+        if surface is not None and any(mesh.transparent for mesh in scene.meshes):
+            self.layers = visible_layers(scene, surface)
         self.distance = np.full(pixels, np.inf) if surface is None else surface.distance.reshape(-1)
         self.rgba, self.bound = np.zeros((pixels, 4)), np.full(pixels, np.inf)
         self.samples = 0
@@ -33,6 +39,10 @@ class Canvas:
     def behind(self, pixels: Indices) -> Floats:
         """Return what lies behind the volume, (R, 4)."""
         return light_behind(self.scene, self.surface, pixels)
+
+    def layers_of(self, pixels: Indices) -> Layers | None:
+        """Return the layers of some pixels, None if the scene has none."""
+        return None if self.layers is None else self.layers.of_pixels(pixels)
 
     def all_behind(self) -> Floats:
         """Return what lies behind the volume at every pixel, (H W, 4), read-only."""
@@ -49,12 +59,15 @@ class Canvas:
             return
         parts = runs(len(self.bound), PIXELS_AT_ONCE)
         for pixels in map(parts.pixels, range(parts.count)):
-            self.rgba[pixels] = self.behind(pixels)
+            layers, distance = self.layers_of(pixels), self.distance[pixels]
+            shown = integrate_layered(None, layers, pixels, distance, self.behind(pixels), 0.0)
+            self.rgba[pixels], self.bound[pixels] = shown.rgba, shown.bound
 
     def show_anything(self, parts: Parts) -> None:
         """Set each pixel of `parts` midway between all that it could be, and the bound to half of that."""
         for pixels in map(parts.pixels, range(parts.count)):
-            self.rgba[pixels], self.bound[pixels] = _anything(self.scene, self.behind(pixels))
+            anything = _anything(self.scene, self.behind(pixels), self.layers_of(pixels))
+            self.rgba[pixels], self.bound[pixels] = anything
 
     def put(
         self, pixels: Indices, rgba: Floats, bound: Floats, samples: int, *, only_better: bool = False
@@ -77,8 +90,8 @@ def light_behind(scene: Scene, surface: Surface | None, pixels: Indices) -> Floa
     return behind
 
 
-def _anything(scene: Scene, behind: Floats) -> tuple[Floats, Floats]:
-    """Return pixels (R, 4) midway between all that the volume could show, and their bound (R,)."""
+def _anything(scene: Scene, behind: Floats, layers: Layers | None) -> tuple[Floats, Floats]:
+    """Return pixels (R, 4) midway between all that volume and layers could show, and their bound (R,)."""
     if scene.volume is None or scene.transfer is None:
         return behind.copy(), np.zeros(len(behind))
     brightest = scene.envelope.colors.max(axis=0)
@@ -86,5 +99,7 @@ def _anything(scene: Scene, behind: Floats) -> tuple[Floats, Floats]:
         material = scene.material or Material()
         brightest = np.array([brightest_lit(scene.lights, material, color) for color in brightest.tolist()])
     most = np.maximum(behind, np.append(brightest, 1.0))
+    if layers is not None:
+        np.maximum.at(most[:, :3], np.repeat(np.arange(len(most)), layers.counts), layers.color)
     least = np.append(np.zeros((len(behind), 3)), behind[:, 3:], axis=1)
     return (most + least) / 2, (most - least).max(axis=1) / 2

@@ -21,6 +21,7 @@ from volref.scene.footprint import Rectangle
 from volref.truth.canvas import Canvas
 from volref.truth.errands import errand_of, forget, run_errand
 from volref.truth.integration import Integrated, Integration
+from volref.truth.layered import integrate_layered
 from volref.truth.parts import Parts, runs_in
 from volref.truth.workers import results
 
@@ -102,7 +103,8 @@ class Crew:
             if time.perf_counter() > self.deadline:
                 return None
             pixels = _joined(parts, task)
-            return integration.integrate(pixels, canvas.distance[pixels], canvas.behind(pixels), tolerance)
+            layers, distance = canvas.layers_of(pixels), canvas.distance[pixels]
+            return integrate_layered(integration, layers, pixels, distance, canvas.behind(pixels), tolerance)
 
         items = ((task,) for task in tasks)
         if self._executor is not None:
@@ -121,11 +123,12 @@ class Crew:
 
         def items() -> Iterator[tuple[Any, ...]]:
             for task in tasks:
-                distance = behind = None
+                distance = behind = layers = None
                 if canvas.surface is not None:
                     pixels = _joined(parts, task)
                     distance, behind = canvas.distance[pixels], canvas.behind(pixels)
-                yield errand, [parts.pixels(i) for i in task], distance, behind, tolerance
+                    layers = canvas.layers_of(pixels)
+                yield errand, [parts.pixels(i) for i in task], distance, behind, layers, tolerance
 
         yield from results(self._executor, run_errand, items(), deadline=self.deadline, threads=self.threads)
 

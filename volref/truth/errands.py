@@ -18,10 +18,12 @@ from volref.arrays import Floats, Indices
 from volref.errors import FormatError
 from volref.io.references import Folder, Message, VolumeReference, fetch_volume, pack, refer_to_volume, unpack
 from volref.planning import Plan
+from volref.records import Layers
 from volref.scene.scene import Scene
 from volref.scene.volume import Volume
 from volref.truth.canvas import light_behind
 from volref.truth.integration import Integrated, Integration
+from volref.truth.layered import integrate_layered
 
 
 @dataclass(frozen=True)
@@ -54,11 +56,13 @@ def run_errand(
     parts: Sequence[Indices],
     distance: Floats | None,
     behind: Floats | None,
+    layers: Layers | None,
     tolerance: float,
 ) -> Integrated:
     """Integrate `parts`, each by itself, and return their R pixels one after the other.
 
-    distance (R,) and behind (R, 4) are of all parts; None: there is no surface, only the background.
+    distance (R,) and behind (R, 4) are of all parts; None: there is no surface, only the background.  So are
+    the layers; None: no mesh is transparent.
 
     Raises
     ------
@@ -69,10 +73,11 @@ def run_errand(
     integration = _integration(errand)
     done, first = [], 0
     for pixels in parts:
-        its = slice(first, first := first + len(pixels))
+        its = np.arange(first, first := first + len(pixels))
         ends = np.full(len(pixels), np.inf) if distance is None else distance[its]
         light = light_behind(integration.scene, None, pixels) if behind is None else behind[its]
-        done.append(integration.integrate(pixels, ends, light, tolerance))
+        between = None if layers is None else layers.of_pixels(its)
+        done.append(integrate_layered(integration, between, pixels, ends, light, tolerance))
     return Integrated(
         np.concatenate([part.rgba for part in done]),
         np.concatenate([part.bound for part in done]),
