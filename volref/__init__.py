@@ -61,6 +61,8 @@ if TYPE_CHECKING:
     )
     from volref.scene.arcball import arcball_rotation, drag
     from volref.tonemap import tone_map
+    from volref.truth.radar.resampling import resample_radar
+    from volref.truth.radar.slices import RadarMap, cappi, ppi
     from volref.truth.rendering import render
     from volref.truth.result import Render
     from volref.truth.series import render_series
@@ -80,6 +82,7 @@ __all__ = [
     "Mesh",
     "Plan",
     "Plane",
+    "RadarMap",
     "RadarVolume",
     "Render",
     "Scene",
@@ -92,6 +95,7 @@ __all__ = [
     "Verification",
     "Volume",
     "arcball_rotation",
+    "cappi",
     "clip_box",
     "compare",
     "convert_volume",
@@ -108,9 +112,11 @@ __all__ = [
     "load_transfer",
     "load_volume",
     "plan",
+    "ppi",
     "read_image",
     "render",
     "render_series",
+    "resample_radar",
     "save_camera",
     "save_mesh",
     "save_radar",
@@ -148,6 +154,8 @@ _HOMES = {
     ),
     "volref.scene.arcball": ("arcball_rotation", "drag"),
     "volref.tonemap": ("tone_map",),
+    "volref.truth.radar.resampling": ("resample_radar",),
+    "volref.truth.radar.slices": ("RadarMap", "cappi", "ppi"),
     "volref.truth.rendering": ("render",),
     "volref.truth.series": ("render_series",),
     "volref.truth.supersampling": ("supersample",),

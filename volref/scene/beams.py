@@ -16,7 +16,7 @@ upwards from the horizon, both in degrees; the range is the slant range, along t
 
 import numpy as np
 
-from volref.arrays import Floats
+from volref.arrays import LARGEST_LENGTH, Floats
 
 BEAMS = ("straight", "4/3-earth")
 
@@ -86,3 +86,22 @@ def widest_ring(slant: float, beam: str) -> float:
     if beam == "straight":
         return slant
     return float(EFFECTIVE_RADIUS * np.arcsin(slant / EFFECTIVE_RADIUS))
+
+
+def slant_of_ground(ground: Floats, elevation: Floats, beam: str) -> Floats:
+    """Return the slant range (m) at which beams reach a distance along the ground; 1e60 where they never do.
+
+    With p = s / R, by the law of sines: r = R sin p / cos(e + p); over a flat earth r = s / cos e.
+
+    Examples
+    --------
+    >>> slant_of_ground(np.array(1000.0), np.array(60.0), "straight").round(6).item()
+    2000.0
+    """
+    tilt = np.radians(elevation)
+    over, across = ground, np.cos(tilt)
+    if beam == "4/3-earth":
+        angle = ground / EFFECTIVE_RADIUS
+        over, across = EFFECTIVE_RADIUS * np.sin(angle), np.cos(tilt + angle)
+    slant: Floats = np.divide(over, across, out=np.full(np.shape(over), LARGEST_LENGTH), where=across > 0)
+    return slant

@@ -121,16 +121,43 @@ def polar_lookup(table: RadarTable, points: Floats) -> tuple[Floats, Booleans]:
     The values lie within the radar's `value_bounds`; the error of the interpolation is a few ulp of the
     larger of these.
     """
-    n = points.shape[1]
-    values = np.full(n, np.nan)
     x, y, z = (points[axis] - table.origin[axis] for axis in range(3))
-    slant, azimuth, elevation = beam_of_world(x, y, z, table.beam)
-    near = np.flatnonzero(_within_reach(table, slant, elevation))
-    if near.size == n:
-        values = _values_at(table, slant, azimuth, elevation)
-    elif near.size:
-        values[near] = _values_at(table, slant[near], azimuth[near], elevation[near])
+    values = beam_lookup(table, *beam_of_world(x, y, z, table.beam))
     return values, ~np.isnan(values)
+
+
+def beam_lookup(table: RadarTable, slant: Floats, azimuth: Floats, elevation: Floats) -> Floats:
+    """Return the value (n,) at slant ranges (m), azimuths (0 to 360) and elevations (degrees), else NaN."""
+    near = np.flatnonzero(_within_reach(table, slant, elevation))
+    if near.size == len(slant):
+        return _values_at(table, slant, azimuth, elevation)
+    values = np.full(len(slant), np.nan)
+    if near.size:
+        values[near] = _values_at(table, slant[near], azimuth[near], elevation[near])
+    return values
+
+
+def sweep_lookup(
+    table: RadarTable, sweep: int, slant: Floats, azimuth: Floats, *, nearest: bool = False
+) -> Floats:
+    """Return the value (n,) on one sweep at slant ranges and azimuths (0 to 360), NaN if there is none.
+
+    nearest: that of the gate around the point, as it was measured, in place of the interpolated one.
+    """
+    azimuth, knot = _folded(table, azimuth)
+    return _in_sweep(table, np.full(len(slant), sweep), knot, slant, azimuth, nearest=nearest)[0]
+
+
+def sweep_elevation(table: RadarTable, sweep: int, azimuth: Floats) -> Floats:
+    """Return the elevation (n,) of one sweep at azimuths (0 to 360), degrees."""
+    azimuth, knot = _folded(table, azimuth)
+    return _around(table, table.radial[knot, sweep], azimuth)[2]
+
+
+def _folded(table: RadarTable, azimuth: Floats) -> tuple[Floats, Indices]:
+    """Return azimuths (n,) below 360, and the knot at or before each, -1 for the last."""
+    azimuth = np.where(azimuth > 360.0 - ON, 0.0, azimuth)
+    return azimuth, np.searchsorted(table.knots, azimuth + ON, side="right") - 1
 
 
 def _within_reach(table: RadarTable, slant: Floats, elevation: Floats) -> Booleans:
@@ -143,8 +170,7 @@ def _within_reach(table: RadarTable, slant: Floats, elevation: Floats) -> Boolea
 
 
 def _values_at(table: RadarTable, slant: Floats, azimuth: Floats, elevation: Floats) -> Floats:
-    azimuth = np.where(azimuth > 360.0 - ON, 0.0, azimuth)
-    knot = np.searchsorted(table.knots, azimuth + ON, side="right") - 1
+    azimuth, knot = _folded(table, azimuth)
     low = _sweeps_below(table, knot, azimuth, elevation)
     high = np.minimum(low + 1, len(table.last) - 1)
     below = low < 0
@@ -193,7 +219,13 @@ def _around(table: RadarTable, radial: Indices, azimuth: Floats) -> tuple[Indice
 
 
 def _in_sweep(
-    table: RadarTable, sweep: Indices, knot: Indices, slant: Floats, azimuth: Floats
+    table: RadarTable,
+    sweep: Indices,
+    knot: Indices,
+    slant: Floats,
+    azimuth: Floats,
+    *,
+    nearest: bool = False,
 ) -> tuple[Floats, Floats]:
     """Return the value (n,) on each point's sweep at its range and azimuth, and the elevation there."""
     before = table.radial[knot, sweep]
@@ -202,7 +234,7 @@ def _in_sweep(
     gate = (slant - table.first_gate[sweep]) / table.gate_spacing[sweep]
     outside = (gate < -0.5 - ON) | (gate > last + 0.5 + ON)
     centre = np.rint(gate)
-    gate = np.where(np.abs(gate - centre) < ON, centre, gate)
+    gate = np.where(nearest | (np.abs(gate - centre) < ON), centre, gate)
     gate = np.clip(gate, 0, last)
     lower = gate.astype(np.intp)
     part = gate - lower
@@ -215,7 +247,7 @@ def _in_sweep(
         )
         for radial in (before, after)
     ]
-    values = _between(along[0], along[1], share)
+    values = _between(along[0], along[1], np.rint(share) if nearest else share)
     values[outside] = np.nan
     return values, tilt
 

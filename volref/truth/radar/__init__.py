@@ -1,0 +1,1 @@
+"""Radars as maps, as volumes on a grid, and in motion."""
