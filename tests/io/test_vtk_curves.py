@@ -98,7 +98,7 @@ def test_lab_is_that_of_colour_science_but_for_vtks_rounded_constants(color):
     rgb = np.array([color]).T
     expected = colour.XYZ_to_Lab(colour.sRGB_to_XYZ(np.array(color)))
     lab = lab_of_rgb(rgb)[:, 0]
-    # VTK's white differs by 5e-5 of x and 6e-5 of z from D65: 500 / 3 and 200 / 3 of that are 0.008 and 0.004.
+    # VTK's white is 5e-5 of x and 6e-5 of z off D65: 500 / 3 and 200 / 3 of that are 0.008 and 0.004.
     np.testing.assert_allclose(lab, expected, rtol=0, atol=0.01)
     np.testing.assert_allclose(rgb_of_lab(lab[:, None]), rgb, rtol=0, atol=5e-4)  # 12.92 times 2e-5
 
