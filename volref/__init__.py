@@ -43,6 +43,7 @@ if TYPE_CHECKING:
         write_image,
     )
     from volref.oracle.metrics import Comparison, compare
+    from volref.phantoms.transfer import dbz_transfer
     from volref.planning import Plan, plan
     from volref.scene import (
         Camera,
@@ -99,6 +100,7 @@ __all__ = [
     "clip_box",
     "compare",
     "convert_volume",
+    "dbz_transfer",
     "describe_file",
     "drag",
     "load_camera",
@@ -136,6 +138,7 @@ __all__ = [
 _HOMES = {
     "volref.errors": ("FormatError", "SceneError"),
     "volref.oracle.metrics": ("Comparison", "compare"),
+    "volref.phantoms.transfer": ("dbz_transfer",),
     "volref.planning": ("Plan", "plan"),
     "volref.scene": (
         "Camera",

@@ -1,6 +1,8 @@
 import numpy as np
 import pytest
 
+import volref as vr
+from tests.oracles.lookup import piecewise
 from volref.phantoms import transfer
 
 MAKERS = [
@@ -52,3 +54,24 @@ def test_a_jump_is_a_step_at_one_value():
     assert table.knot_extinction.tolist() == [1, 2, 2, 3, 3, 0]
     assert table.colors[:, 0].tolist() == [1, 0, 0, 0, 0, 0]
     assert table.colors[:, 2].tolist() == [0, 0, 0, 1, 1, 1]
+
+
+def test_reflectivity_has_the_colour_of_its_band_and_is_clear_below_5_dbz():
+    table = vr.dbz_transfer()
+    bands = {7.0: (4, 233, 231), 37.0: (253, 248, 2), 50.0: (253, 0, 0), 74.9: (152, 84, 198)}
+    bands |= {75.0: (253, 253, 253), 90.0: (253, 253, 253)}
+    for dbz, codes in bands.items():
+        found = [255 * piecewise(table.values, channel, dbz) for channel in table.colors.T]
+        np.testing.assert_allclose(found, codes, rtol=0, atol=1e-12)
+    assert not table.is_visible(-32.0, 5.0)
+    assert table.units == "dBZ"
+
+
+@pytest.mark.parametrize("banded", [True, False])
+def test_reflectivity_reaches_its_extinction_at_75_dbz_without_a_jump(banded):
+    table = vr.dbz_transfer(0.02, banded=banded)
+    assert table.extinction.max() == 0.02
+    assert table.most_extinction(40.0, 40.0) == pytest.approx(0.02 / 4, rel=1e-15)
+    assert (np.diff(table.values) == 0).any() == banded
+    jumps = np.flatnonzero(np.diff(table.values) == 0)
+    assert np.array_equal(table.extinction[jumps], table.extinction[jumps + 1])

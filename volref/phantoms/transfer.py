@@ -18,6 +18,13 @@ _RED, _GREEN, _BLUE = (0.1, 0.9, 0.9, 1.0), (0.2, 0.3, 0.8, 0.9), (0.8, 0.2, 0.1
 # Extinction, as a share of the largest, at fractions of the table: empty below 0.15.
 _SHARES_AT, _SHARES = (0.0, 0.15, 0.35, 0.55, 0.8, 1.0), (0.0, 0.0, 0.15, 0.4, 1.0, 1.0)
 
+# Reflectivity from 5 dBZ on in steps of 5, 8-bit codes as the National Weather Service has them.
+_REFLECTIVITY = (
+    *((4, 233, 231), (1, 159, 244), (3, 0, 244), (2, 253, 2), (1, 197, 1), (0, 142, 0), (253, 248, 2)),
+    *((229, 188, 0), (253, 149, 0), (253, 0, 0), (212, 0, 0), (188, 0, 0), (248, 0, 253), (152, 84, 198)),
+    (253, 253, 253),
+)
+
 
 def grey_ramp(low: float = 0.0, high: float = 1.0, extinction: float = 1.0) -> TransferFunction:
     """Return black to white and clear to `extinction`, linear, two knots.
@@ -118,6 +125,35 @@ def steps(
         np.repeat(np.asarray(edges, dtype=np.float64), 2),
         np.stack([paints[below], paints[above]], axis=1).reshape(-1, 3),
         np.stack([inside, beyond], axis=1).ravel(),
+    )
+
+
+def dbz_transfer(extinction: float = 1e-3, *, banded: bool = True) -> TransferFunction:
+    """Return the usual colours of radar reflectivity (dBZ): those of the US National Weather Service.
+
+    Bands of 5 dBZ from 5 to 75 and above: blue, green, yellow, red, purple, white.  `banded=False` runs from
+    the colour of one band's beginning to the next's.  Below 5 dBZ, and so where there is no echo, nothing is
+    seen; from there the extinction grows with the square of the distance to 5 dBZ, up to `extinction` per
+    world unit at 75, so that drizzle is a veil and hail is solid.  The default is for metres: half of the
+    light is lost in 3.8 km of 35 dBZ, and in 0.7 km of 75.
+
+    Examples
+    --------
+    >>> transfer = dbz_transfer()
+    >>> transfer.is_visible([-32.0, 5.0], [4.9, 5.1]).tolist(), transfer.units
+    ([False, True], 'dBZ')
+    """
+    start = 5.0 + 5.0 * np.arange(len(_REFLECTIVITY))
+    colors = np.array(_REFLECTIVITY) / 255
+    share = ((start - 5.0) / 70.0) ** 2
+    if not banded:
+        return TransferFunction(start, colors, extinction * share, units="dBZ")
+    # Two knots at each band's beginning: the colour jumps, the extinction does not.
+    return TransferFunction(
+        np.repeat(start, 2)[1:],
+        np.repeat(colors, 2, axis=0)[:-1],
+        extinction * np.repeat(share, 2)[1:],
+        units="dBZ",
     )
 
 
