@@ -4,7 +4,7 @@ import dataclasses
 from dataclasses import dataclass, field
 from typing import Any
 
-from volref.arrays import Booleans
+from volref.arrays import Booleans, Floats
 from volref.errors import SceneError
 from volref.scene.palette import FULL_PALETTE, Palette
 from volref.scene.scene import Scene
@@ -70,6 +70,9 @@ class Plan:
         What the precision may change beside the roundings of compositing, in units of the brightest colour.
     block
         Segments of a ray that are sampled together, or left out together: 3 or 6.
+    offsets
+        Where in its segments a march takes the samples of each pixel (height width,), from 0 to 1 from front
+        to back; None: in the middle, 1/2.
     """
 
     scene: Scene = field(repr=False)
@@ -84,6 +87,7 @@ class Plan:
     precision: str = "float64"
     rounding: float = 0.0
     block: int = SEGMENTS_PER_BLOCK
+    offsets: Floats | None = field(default=None, repr=False)
 
     def includes(self, name: str) -> bool:
         """Tell whether the stage `name` takes part."""
@@ -126,6 +130,9 @@ class Plan:
         if not same or bool(mine.meshes) != bool(scene.meshes):
             message = "plan must be one for this scene, got the plan of another volume, transfer function or "
             raise SceneError(message + "meshes; make one with volref.plan(scene)")
+        if self.offsets is not None and self.offsets.shape != (scene.width * scene.height,):
+            message = f"plan.offsets must be one for each of {scene.width} x {scene.height} pixels, got shape "
+            raise SceneError(message + f"{self.offsets.shape}; make an image of the scene's size")
 
     def as_dict(self) -> dict[str, Any]:
         """Return the plan as plain data for JSON."""

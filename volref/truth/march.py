@@ -61,6 +61,7 @@ class _State:
     """Rays at work: where they start and how far a segment goes (3, R) in the padded space of the field.
 
     viewer (3, R): the unit world direction towards the viewer, or (0, R) if the field does not ask for it.
+    place (1, R): where in its segments a ray takes its samples, or (0, R) if all do in the middle.
     number (R,): which ray of the chunk it is.  length (R,): of a segment, in the world.  segments (R,): how
     many there are.  blocks (R,): how many of its blocks are marched; rays are sorted by it.  first (b, R):
     the first segment of each of them.  coarse_transmittance and coarse_color are those at three times the
@@ -71,6 +72,7 @@ class _State:
     start: Floats
     stride: Floats
     viewer: Floats
+    place: Floats
     length: Floats
     segments: Indices
     blocks: Indices
@@ -108,7 +110,8 @@ def march_chunk(
     origins = np.broadcast_to(origins, directions.shape)
     spans = cut_spans(box_spans(origins, directions, field.low, field.high), begin, distance)
     viewer = -rays.directions.T if field.sees_viewer else np.empty((0, len(pixels)))
-    state = _state_of(plan, field, origins, directions, spans, viewer)
+    place = np.empty((0, len(pixels))) if plan.offsets is None else plan.offsets[pixels][None]
+    state = _state_of(plan, field, origins, directions, spans, viewer, place)
     rgba, bound, samples = behind.copy(), np.zeros(len(pixels)), 0
     for part in _marched(plan, field, state, work):
         samples += int(part.blocks.sum()) * plan.block
@@ -135,7 +138,13 @@ def segments_of(spans: Spans, step: float) -> tuple[Indices, Floats]:
 
 
 def _state_of(
-    plan: Plan, field: Field, origins: Floats, directions: Floats, spans: Spans, viewer: Floats
+    plan: Plan,
+    field: Field,
+    origins: Floats,
+    directions: Floats,
+    spans: Spans,
+    viewer: Floats,
+    place: Floats,
 ) -> _State:
     """Return the rays that have something to march, sorted, before anything is marched."""
     segments, length = segments_of(spans, plan.step)
@@ -151,6 +160,7 @@ def _state_of(
         start.take(order, axis=1),
         stride.take(order, axis=1),
         viewer.take(order, axis=1),
+        place.take(order, axis=1),
         length.take(order).astype(kind),
         segments.take(order),
         blocks.take(order),
@@ -186,7 +196,8 @@ def _marched(plan: Plan, field: Field, state: _State, work: Workspace) -> Iterat
 def _offsets(field: Field, state: _State, block: int) -> Floats:
     """Return how far the samples of a block lie from `reach` before its beginning, (3, S, R)."""
     kind = state.length.dtype
-    offsets = state.stride.astype(kind)[:, None] * (np.arange(block) + 0.5).astype(kind)[:, None]
+    inside = state.place[0] if len(state.place) else 0.5
+    offsets = state.stride.astype(kind)[:, None] * (np.arange(block)[:, None] + inside).astype(kind)
     offsets += kind.type(field.reach)
     return np.asarray(offsets)
 
