@@ -1,10 +1,13 @@
 """Transfer functions that other programs write: ParaView, Slicer and VPT."""
 
 import json
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from tests.oracles.lookup import piecewise, vpt_canvas
 from volref.errors import FormatError, SceneError
@@ -189,7 +192,12 @@ BAD = [
     ("log scale", MAP | {"UseLogScale": 1}, {}, "must be linear in the value"),
     ("odd count", MAP | {"RGBPoints": [0, 0, 0]}, {}, "four for each point, got 3 numbers"),
     ("text for numbers", MAP | {"RGBPoints": ["a"] * 4}, {}, "RGBPoints must be numbers"),
-    ("opacity above 1", MAP | {"Points": [0, 2, 0.5, 0]}, {}, "opacity must lie in 0..1, got 2"),
+    (
+        "opacity above 1",
+        MAP | {"Points": [0, 2, 0.5, 0]},
+        {},
+        "opacity nodes must have channels in 0..1, got 2 at index 0",
+    ),
     ("midpoint above 1", MAP | {"Points": [0, 0, 1.5, 0]}, {}, "midpoint and sharpness in 0..1"),
     ("wrong count", STRINGS | {"scalarOpacity": "6 0 0 1 1"}, {}, "begin with the count .* got 6 before 4"),
     ("no opacity", {"colorTransfer": "4 0 1 1 1"}, {}, "scalarOpacity must begin .* got nothing before 0"),
@@ -240,3 +248,59 @@ def test_a_bad_file_is_refused_in_one_sentence(tmp_path, content, options, fragm
 def test_only_presets_are_loaded_as_presets(tmp_path):
     with pytest.raises(FormatError, match="must hold presets of Slicer"):
         load_preset(saved(tmp_path, [MAP]))
+
+
+SOUND = [
+    [MAP, MAP | {"Name": "other", "ColorSpace": "Diverging", "Points": [0, 0, 0.3, 0.5, 1, 1, 0.5, 0]}],
+    MAP | {"ColorSpace": "HSV", "HSVWrap": 1},
+    [STRINGS],
+    {"volumeProperties": [{"components": [COMPONENT]}]},
+    BUMPS[:1],
+    {
+        "format": "volref-transfer",
+        "format_version": 1,
+        "values": [0, 1],
+        "colors": [[0, 0, 0], [1, 1, 1]],
+        "opacity": [0, 0.5],
+        "gradient_opacity": [[0, 1], [0, 1]],
+        "units": "HU",
+    },
+    {
+        "format": "volref-transfer",
+        "format_version": 1,
+        "value_domain": [0, 1],
+        "magnitude_domain": [0, 1],
+        "rgba": [[[0, 0, 0, 0.5]]],
+    },
+]
+ODD = [None, True, "", "x", "nan", [], [[]], {}, [0], 0, -1, 2, 0.5, 1e308, -1e308, 1e-320, 10**25, "9" * 400]
+
+
+def places(content, path=()):
+    """Return the path of every part of a document."""
+    inner = content.items() if isinstance(content, dict) else ()
+    if isinstance(content, list):
+        inner = enumerate(content)
+    return [path, *(place for key, part in inner for place in places(part, (*path, key)))]
+
+
+def with_part(content, path, part):
+    if not path:
+        return part
+    copy = content.copy()
+    copy[path[0]] = with_part(content[path[0]], path[1:], part)
+    return copy
+
+
+@pytest.mark.parametrize("sound", SOUND, ids=range(len(SOUND)))
+@settings(max_examples=50)
+@given(st.data())
+def test_a_document_with_one_odd_part_is_read_or_refused(tmp_path_factory, sound, data):
+    path = tmp_path_factory.getbasetemp() / "odd.json"
+    odd = with_part(sound, data.draw(st.sampled_from(places(sound))), data.draw(st.sampled_from(ODD)))
+    path.write_text(json.dumps(odd))
+    for load in (load_transfer, load_preset):
+        with suppress(FormatError, SceneError):
+            load(path)
+        with suppress(FormatError, SceneError):
+            load(path, key="other")

@@ -92,15 +92,15 @@ def test_hues_and_back_are_the_same_colour(one, other):
     np.testing.assert_allclose(rgb_of_hsv(hsv_of_rgb(rgb)), rgb, rtol=0, atol=4e-15)
 
 
-@given(st.tuples(unit, unit, unit))
-def test_lab_is_that_of_colour_science_but_for_vtks_rounded_constants(color):
+def test_lab_is_that_of_colour_science_but_for_vtks_rounded_constants():
     colour = import_colour()
-    rgb = np.array([color]).T
-    expected = colour.XYZ_to_Lab(colour.sRGB_to_XYZ(np.array(color)))
-    lab = lab_of_rgb(rgb)[:, 0]
+    rgb = np.concatenate([np.random.default_rng(4).random((3, 2000)), np.eye(3), np.ones((3, 1))], axis=1)
+    expected = colour.XYZ_to_Lab(colour.sRGB_to_XYZ(rgb.T)).T
+    lab = lab_of_rgb(rgb)
     # VTK's white is 5e-5 of x and 6e-5 of z off D65: 500 / 3 and 200 / 3 of that are 0.008 and 0.004.
     np.testing.assert_allclose(lab, expected, rtol=0, atol=0.01)
-    np.testing.assert_allclose(rgb_of_lab(lab[:, None]), rgb, rtol=0, atol=5e-4)  # 12.92 times 2e-5
+    # Its two matrices are inverse to 2e-5, of which dark codes are 12.92 times as much.
+    np.testing.assert_allclose(rgb_of_lab(lab), rgb, rtol=0, atol=5e-4)
 
 
 def test_joined_curves_keep_every_knot_and_jump():
@@ -113,7 +113,7 @@ def test_joined_curves_keep_every_knot_and_jump():
 @pytest.mark.parametrize(
     ("nodes", "fragment"),
     [
-        ([(0, 0, 2, 0)], r"must have midpoint and sharpness in 0..1, got \[2.0, 0.0\] at index 0"),
+        ([(0, 0, 2, 0)], r"must have midpoint and sharpness in 0..1, got 2 at index 0"),
         (np.zeros((0, 4)), "must be 1 to 65536, got 0"),
         (np.zeros((65537, 4)), "must be 1 to 65536, got 65537; make them fewer"),
         ([(0, np.nan)], "must be finite"),

@@ -15,7 +15,7 @@ import numpy as np
 from volref.arrays import Floats, float_array
 from volref.errors import FormatError
 from volref.io.guard import Foreign, one_line
-from volref.io.vtk_curves import SPACES, color_curve, joined, opacity_curve
+from volref.io.vtk_curves import LARGEST, SPACES, color_curve, joined, opacity_curve
 from volref.scene.transfer import TransferFunction
 
 
@@ -64,7 +64,7 @@ def _rows(file: Path, name: str, numbers: object) -> Floats:
         got = f"{len(numbers)} numbers" if isinstance(numbers, list) else type(numbers).__name__
         message = f"{file.name}: {name} must be a list of numbers, four for each point, got {got}; "
         raise FormatError(message + "save it again")
-    return float_array(f"transfer {name}", numbers, ("n",)).reshape(-1, 4).copy()
+    return float_array(f"transfer {name}", numbers, ("n",), limit=LARGEST).reshape(-1, 4).copy()
 
 
 def _spread(values: Floats, domain: tuple[float, float]) -> Floats:

@@ -33,6 +33,7 @@ TOLERANCE = 2.5e-5
 SAME = 5e-5
 
 MOST_NODES = 65536
+LARGEST = 1e300  # differences of values stay finite
 MOST_ROUNDS = 12  # 2^12 pieces between two nodes
 
 
@@ -154,17 +155,18 @@ def _stretches(nodes: _Nodes, space: str) -> _Stretches:
 
 def _checked_nodes(name: str, nodes: ArrayLike, channels: int) -> Floats:
     """Return nodes (n, channels + 3): x, the channels, midpoint and sharpness, in order of x."""
-    table = float_array(f"transfer {name}", nodes, ("n", "columns"))
+    table = float_array(f"transfer {name}", nodes, ("n", "columns"), limit=LARGEST)
     if table.shape[1] == channels + 1:
         table = np.column_stack([table, np.full(len(table), 0.5), np.zeros(len(table))])
     if not 1 <= len(table) <= MOST_NODES:
         message = f"transfer {name} must be 1 to {MOST_NODES}, got {len(table)}; make them fewer"
         raise SceneError(message)
-    bent = table[:, -2:]
-    if ((bent < 0) | (bent > 1)).any():
-        i = int(np.argwhere((bent < 0) | (bent > 1))[0][0])
-        message = f"transfer {name} must have midpoint and sharpness in 0..1, got {bent[i].tolist()} "
-        raise SceneError(message + f"at index {i}; change them")
+    for what, part in (("channels", table[:, 1:-2]), ("midpoint and sharpness", table[:, -2:])):
+        outside = (part < 0) | (part > 1)
+        if outside.any():
+            i, j = np.argwhere(outside)[0]
+            message = f"transfer {name} must have {what} in 0..1, got {part[i, j]:g} at index {i}; change it"
+            raise SceneError(message)
     return np.asarray(table[np.argsort(table[:, 0], kind="stable")])
 
 
