@@ -122,7 +122,13 @@ def polar_lookup(table: RadarTable, points: Floats) -> tuple[Floats, Booleans]:
     larger of these.
     """
     x, y, z = (points[axis] - table.origin[axis] for axis in range(3))
-    values = beam_lookup(table, *beam_of_world(x, y, z, table.beam))
+    if table.beam != "straight":
+        values = beam_lookup(table, *beam_of_world(x, y, z, table.beam))
+        return values, ~np.isnan(values)
+    values = np.full(len(x), np.nan)
+    near = _perhaps_seen(table, x, y, z)
+    if near.size:
+        values[near] = _values_at(table, *beam_of_world(x[near], y[near], z[near], table.beam))
     return values, ~np.isnan(values)
 
 
@@ -160,10 +166,26 @@ def _folded(table: RadarTable, azimuth: Floats) -> tuple[Floats, Indices]:
     return azimuth, np.searchsorted(table.knots, azimuth + ON, side="right") - 1
 
 
+def _perhaps_seen(table: RadarTable, x: Floats, y: Floats, z: Floats) -> Indices:
+    """Return which points are not beyond all sweeps of straight beams; angles cost more than all the rest."""
+    slant = np.sqrt(x * x + y * y + z * z)
+    low, high = np.sin(np.radians((table.elevation.min() - ON, table.elevation.max() + ON)))
+    # The slack covers the rounding of slant and sines; what it lets through is looked at again.
+    slack = 1e-12 * slant
+    inside = slant <= (1 + 1e-12) * _ends(table).max()
+    inside &= z >= low * slant - slack
+    inside &= z <= high * slant + slack
+    return np.flatnonzero(inside)
+
+
+def _ends(table: RadarTable) -> Floats:
+    """Return where the sweeps (S,) end, metres."""
+    return np.asarray(table.first_gate + (table.last + 0.5 + ON) * table.gate_spacing)
+
+
 def _within_reach(table: RadarTable, slant: Floats, elevation: Floats) -> Booleans:
     """Leave out the points (n,) that lie beyond all sweeps."""
-    ends = table.first_gate + (table.last + 0.5 + ON) * table.gate_spacing
-    inside = slant <= ends.max()
+    inside = slant <= _ends(table).max()
     inside &= elevation >= table.elevation.min() - ON
     inside &= elevation <= table.elevation.max() + ON
     return np.asarray(inside)
