@@ -107,6 +107,9 @@ def test_coincident_surfaces_are_in_the_order_of_mesh_and_face():
     assert set(layers.counts.tolist()) == {0, 2}
     assert set(layers.mesh.tolist()) == {0}
     assert layers.face.reshape(-1, 2).tolist() == [[0, 1]] * (len(layers.face) // 2)
+    layers = layers_of(scene_of([pane, pane]))
+    assert layers.mesh.reshape(-1, 4).tolist() == [[0, 0, 1, 1]] * (len(layers.face) // 4)
+    assert layers.face.reshape(-1, 4).tolist() == [[0, 1, 0, 1]] * (len(layers.face) // 4)
 
 
 def sorted_look(layers):
@@ -191,6 +194,7 @@ def test_layers_of_some_pixels_are_theirs():
 CUTS = {
     "one plane": [Plane((0.1, 0, 0), (1, 0, 0))],
     "away from the viewer": [Plane((0.1, 0, 0), (-1, 0, 0))],
+    "before a camera inside": [Plane((0.6, 0, 0), (-1, 0, 0))],
     "a wedge": [Plane((0, 0.1, 0), (0, -1, 0)), Plane((0, 0, 0.2), (0, 0, 1))],
 }
 

@@ -20,8 +20,10 @@ ROUNDOFF = 2.0**-53
 ROUNDINGS = 4
 # Bounds are sums and products of a few numbers above 0, which are rounded too.
 UPWARDS = 1 + 16 * ROUNDOFF
-# What is left of the tolerance for roundings.
+# The part of the tolerance that slabs share; the rest is for roundings.
 SHARE = 0.99
+# A slab of which next to nothing arrives may be off by this, or by the tolerance if that is more.
+ANYTHING = 1.0
 
 
 def integrate_layered(
@@ -104,5 +106,6 @@ def _shared_out(layers: Layers, tolerance: float) -> list[float]:
             arriving[~has] = 0.0
             arriving[has] *= 1.0 - layers.opacity[layers.starts[:-1][has] + rank - 1]
         most = float(arriving.max(initial=0.0))
-        shares.append(SHARE * tolerance / slabs / most if most > 0 else np.inf)
+        share = SHARE * tolerance / slabs
+        shares.append(share / most if share < ANYTHING * most else max(tolerance, ANYTHING))
     return shares if slabs > 1 else [tolerance]
