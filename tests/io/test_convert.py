@@ -6,7 +6,7 @@ import json
 import numpy as np
 import pytest
 
-from tests.io.test_volumes import letter_f
+from tests.letters import letter_f
 from volref.errors import FormatError
 from volref.io import convert_volume, load_volume, save_volume
 from volref.scene import Volume
@@ -14,14 +14,16 @@ from volref.scene import Volume
 TURN = np.array([[0.6, -0.8, 0], [0.8, 0.6, 0], [0, 0, -1.0]])
 VOLUME = Volume(letter_f(), (0.7, 1.3, 5.1), (-98.3, 134.5, 72.1), TURN)
 
-# How far a position may move, as a share of its size: NRRD is text of 17 digits, joined and split again
-# (a few ulp); NIfTI stores float32, half an ulp of which is 2^-24 = 6e-8.
+# How far a position may move, as a share of its size: NRRD and MetaImage are text of 17 digits, joined and
+# split again (a few ulp); NIfTI stores float32, half an ulp of which is 2^-24 = 6e-8.
 EXACT, TEXT, FLOAT32 = 0.0, 1e-15, 6e-8
 FORMATS = [
     (".npy", EXACT),
     (".npz", EXACT),
     (".raw", EXACT),
+    (".h5", EXACT),
     (".nrrd", TEXT),
+    (".mha", TEXT),
     (".nii", FLOAT32),
     (".nii.gz", FLOAT32),
 ]
@@ -38,6 +40,8 @@ def assert_same(one, other, tolerance):
 @pytest.mark.parametrize(("suffix", "tolerance"), FORMATS)
 @pytest.mark.parametrize("dtype", [np.uint8, np.int16, np.uint16, np.int64, np.float32, np.float64])
 def test_a_volume_comes_back_from_each_format(tmp_path, suffix, tolerance, dtype):
+    if (suffix, dtype) == (".mha", np.int64):
+        suffix = ".hdf5"  # MetaImage's MET_LONG has 4 bytes in some programs and 8 in others
     volume = Volume(letter_f(dtype), VOLUME.spacing, VOLUME.origin, TURN)
     save_volume(volume, tmp_path / f"v{suffix}")
     assert_same(volume, load_volume(tmp_path / f"v{suffix}"), tolerance)
@@ -45,7 +49,7 @@ def test_a_volume_comes_back_from_each_format(tmp_path, suffix, tolerance, dtype
 
 def test_a_chain_of_conversions_ends_where_it_began(tmp_path):
     volume = Volume(letter_f(np.uint8), (1, 2, 4), (8, -16, 32), np.diag([1.0, -1, 1]))
-    names = ["a.npy", "b.npz", "c.raw", "d.png", "e.nrrd", "f.nii.gz", "g.npy"]
+    names = ["a.npy", "b.npz", "c.raw", "d.png", "e.nrrd", "f.nii.gz", "h.mha", "i.h5", "g.npy"]
     save_volume(volume, tmp_path / names[0])
     for source, target in itertools.pairwise(names):
         convert_volume(tmp_path / source, tmp_path / target)
@@ -100,3 +104,11 @@ def test_an_old_sidecar_of_a_format_that_needs_none_is_refused_or_removed(tmp_pa
     save_volume(VOLUME, path, overwrite=True)
     assert_same(VOLUME, load_volume(path), FLOAT32)
     assert not beside.exists()
+
+
+def test_metaimage_refuses_what_it_cannot_say(tmp_path):
+    with pytest.raises(FormatError, match=r"a type that MetaImage has, got int64; use \.nrrd or \.npz$"):
+        save_volume(Volume(letter_f(np.int64)), tmp_path / "v.mha")
+    with pytest.raises(FormatError, match=r"'cell', got 'node'; use \.nrrd or \.npz$"):
+        save_volume(Volume(letter_f(), centering="node"), tmp_path / "v.mha")
+    assert not list(tmp_path.iterdir())

@@ -36,7 +36,9 @@ def assert_same(first, second):
 PLACE = {"spacing": (0.1, 0.7, 1 / 3), "origin": (1e-3, 2, -3), "direction": np.eye(3)[[1, 2, 0]]}
 
 
-@pytest.mark.parametrize("suffix", [".npy", ".npz", ".nrrd", ".nii", ".nii.gz", ".raw", ".png"])
+@pytest.mark.parametrize(
+    "suffix", [".npy", ".npz", ".nrrd", ".nii", ".nii.gz", ".mha", ".h5", ".raw", ".png"]
+)
 def test_a_volume_from_a_file_is_read_from_there(tmp_path, suffix):
     path = tmp_path / f"volume{suffix}"
     save_volume(rough_volume(dtype=np.uint8, centering="cell", **PLACE), path)
