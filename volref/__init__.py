@@ -22,6 +22,7 @@ if TYPE_CHECKING:
         convert_volume,
         describe_file,
         load_camera,
+        load_jitter,
         load_mesh,
         load_meshes,
         load_preset,
@@ -61,7 +62,9 @@ if TYPE_CHECKING:
         clip_box,
     )
     from volref.scene.arcball import arcball_rotation, drag
+    from volref.stages.jitter import jitter_images
     from volref.tonemap import tone_map
+    from volref.truth.jittered import render_jittered
     from volref.truth.radar.resampling import resample_radar
     from volref.truth.radar.slices import RadarMap, cappi, ppi
     from volref.truth.rendering import render
@@ -103,7 +106,9 @@ __all__ = [
     "dbz_transfer",
     "describe_file",
     "drag",
+    "jitter_images",
     "load_camera",
+    "load_jitter",
     "load_mesh",
     "load_meshes",
     "load_preset",
@@ -117,6 +122,7 @@ __all__ = [
     "ppi",
     "read_image",
     "render",
+    "render_jittered",
     "render_series",
     "resample_radar",
     "save_camera",
@@ -160,6 +166,8 @@ _HOMES = {
     "volref.truth.radar.resampling": ("resample_radar",),
     "volref.truth.radar.slices": ("RadarMap", "cappi", "ppi"),
     "volref.truth.rendering": ("render",),
+    "volref.stages.jitter": ("jitter_images",),
+    "volref.truth.jittered": ("render_jittered",),
     "volref.truth.series": ("render_series",),
     "volref.truth.supersampling": ("supersample",),
     "volref.truth.result": ("Render",),

@@ -68,10 +68,10 @@ def table_value(positions, column, value):
     return column[k] + part * (column[k + 1] - column[k])
 
 
-def march_ray(volume, transfer, origin, direction, step, surface=None, background=(0, 0, 0, 0)):
+def march_ray(volume, transfer, origin, direction, step, surface=None, background=(0, 0, 0, 0), place=0.5):
     """Premultiplied RGBA of one world ray by the midpoint rule, for an axis-aligned volume.
 
-    `surface` is (distance, (r, g, b)) of an opaque surface.
+    `surface` is (distance, (r, g, b)) of an opaque surface; `place` is where in its segment a sample lies.
     """
     low, high = ([float(x) for x in bound] for bound in volume.index_bounds)
     scale = [1 / s for s in volume.spacing]
@@ -85,7 +85,7 @@ def march_ray(volume, transfer, origin, direction, step, surface=None, backgroun
     length = max(span[1] - span[0], 0.0) if span else 0.0
     count = 3 * math.ceil(length / (3 * step) * (1 - 1e-12))
     for k in range(count):
-        t = span[0] + (k + 0.5) * length / count
+        t = span[0] + (k + place) * length / count
         value = trilinear(volume.values, [a + t * b for a, b in zip(start, slope, strict=True)])
         opacity = segment_opacity(transfer, value, length / count)
         for channel in range(3):

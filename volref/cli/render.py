@@ -2,14 +2,12 @@
 
 import argparse
 import math
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from volref.cli.display import add_display, check_display, save
 from volref.cli.machines import add_dask, executor_at
 from volref.cli.options import (
-    accuracy,
     add_accuracy,
     add_force,
     add_json,
@@ -19,6 +17,7 @@ from volref.cli.options import (
     read_scene,
 )
 from volref.cli.output import note, print_json, progress
+from volref.cli.rays import add_rays, draw_with
 from volref.cli.series import add_series, check_no_series, run_series
 from volref.cli.verb import DIFFERS, GOOD, Verb
 from volref.errors import FormatError
@@ -50,17 +49,12 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         help="begin nothing more after S seconds; what is not finished then has a larger error, and says so",
     )
     parser.add_argument(
-        "--supersample",
-        type=int,
-        metavar="N",
-        help="make each pixel the mean of N x N rays; the error is that of their mean",
-    )
-    parser.add_argument(
         "--verify",
         type=int,
         metavar="N",
         help="integrate N random rays again at 30 digits, by another path, and compare (extra 'verify')",
     )
+    add_rays(parser)
     add_display(parser)
     add_series(parser)
     add_work(parser)
@@ -70,27 +64,21 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _run(options: argparse.Namespace) -> int:
-    from volref import render, supersample
-
+    draw = draw_with(options)
     if options.series is not None:
         return run_series(options)
     check_no_series(options)
     targets = [Path(name) for name in options.output]
     _check_targets(targets, force=options.force)
     check_display(options)
-    if options.supersample is not None and options.verify is not None:
-        message = "--verify must be given without --supersample, whose pixels are no single rays, got both; "
-        raise FormatError(message + "leave one out")
     scene = read_scene(options)
-    draw = render if options.supersample is None else partial(supersample, factor=options.supersample)
     with executor_at(options.dask) as executor, progress("render", quiet=options.quiet) as show:
         out = draw(
             scene,
             threads=options.threads,
             executor=executor,
-            max_seconds=options.max_seconds,
             progress=show,
-            **accuracy(options),
+            **({} if options.max_seconds is None else {"max_seconds": options.max_seconds}),
         )
     for target in targets:
         save(out, target, options)
@@ -186,6 +174,7 @@ VERB = Verb(
         ("render scene.json -o quick.png --max-seconds 5", "what can be certified in five seconds"),
         ("render scene.json -o look.png --step 1 --tolerance 1", "a quick march, its error estimated"),
         ("render scene.json -o smooth.png --supersample 4", "each pixel the mean of 4 x 4 rays"),
+        ("render scene.json -o even.png --step 2 --frames 64", "the mean of 64 marches with random starts"),
         ("render scene.json -o bright.png --tone-map hable --exposure 4", "strong light, filmed"),
         (
             "render scene.json --series scans/ --times 0:600 --interpolate 10 -o film.png",

@@ -8,6 +8,7 @@ from volref.io.convert import convert_volume, save_volume
 from volref.io.documents import scene_schema
 from volref.io.images import read_image, write_image
 from volref.io.info import describe_file
+from volref.io.jitter import load_jitter
 from volref.io.meshes import load_mesh, load_meshes, save_mesh
 from volref.io.png import write_png
 from volref.io.radar.door import load_radar, save_radar
@@ -23,6 +24,7 @@ __all__ = [
     "convert_volume",
     "describe_file",
     "load_camera",
+    "load_jitter",
     "load_mesh",
     "load_meshes",
     "load_preset",

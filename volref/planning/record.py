@@ -131,7 +131,7 @@ class Plan:
             message = "plan must be one for this scene, got the plan of another volume, transfer function or "
             raise SceneError(message + "meshes; make one with volref.plan(scene)")
         if self.offsets is not None and self.offsets.shape != (scene.width * scene.height,):
-            message = f"plan.offsets must be one for each of {scene.width} x {scene.height} pixels, got shape "
+            message = f"plan.offsets must be one per pixel of {scene.width} x {scene.height}, got shape "
             raise SceneError(message + f"{self.offsets.shape}; make an image of the scene's size")
 
     def as_dict(self) -> dict[str, Any]:
