@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike
 
 from volref.arrays import Bytes, Floats, float_array, number, whole_number
 from volref.phantoms.grid import Size
-from volref.scene import Volume
+from volref.scene import RadarVolume, Sweep, Volume
 
 # Reflectivity of clear air: the floor that keeps the logarithm finite.
 CLEAR_DBZ = -32.0
@@ -222,6 +222,25 @@ def sample_polar(
     for s, (angle, time) in enumerate(zip(elevation, times.tolist(), strict=True)):
         dbz[s] = reflectivity(storm, *polar_points(angle, azimuth[:, None], slant), time)
     return PolarScan(elevation, azimuth, slant, dbz, times)
+
+
+def radar_of_scan(scan: PolarScan, *, beam: str = "straight") -> RadarVolume:
+    """Radar volume of a scan; gates of clear air have no echo.
+
+    Examples
+    --------
+    >>> radar = radar_of_scan(sample_polar(make_storm(), azimuths=36, gates=40, gate_length=2000))
+    >>> len(radar.sweeps), radar.sweeps[0].values.shape, radar.gate_length, radar.no_echo
+    (14, (36, 40), 2000.0, -32.0)
+    """
+    first = float(scan.range_m[0])
+    spacing = float(scan.range_m[1]) - first if len(scan.range_m) > 1 else 2 * first
+    gates = np.where(scan.dbz > CLEAR_DBZ + 0.5, scan.dbz, -np.inf)
+    sweeps = [
+        Sweep(scan.azimuth_deg, tilt, values, first, spacing)
+        for tilt, values in zip(scan.elevation_deg.tolist(), gates, strict=True)
+    ]
+    return RadarVolume(sweeps, no_echo=CLEAR_DBZ, beam=beam)
 
 
 def sample_cartesian(

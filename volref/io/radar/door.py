@@ -132,7 +132,8 @@ def _kind_of_hdf5(file: Path) -> str:
     """Tell the formats that are HDF5 inside by the groups they are made of."""
     h5py = extra("h5py", "HDF5", "h5py")
     with wrapped(file, "HDF5 file"), h5py.File(file, "r") as root:
-        names = set(root)
+        # A name that is no UTF-8 comes as bytes.
+        names = {str(name) for name in root}
     if "dataset1" in names:
         return "odim"
     if "scan0" in names:

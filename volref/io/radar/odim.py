@@ -223,7 +223,7 @@ def _said(whole: _Place, places: list[_Place], quantity: str) -> dict[str, Any]:
 
 def _numbered(file: Path, group: Foreign, word: str) -> list[Foreign]:
     """Return the groups word1, word2 ... in the order of their numbers."""
-    names = [name for name in group if re.fullmatch(f"{word}[0-9]{{1,6}}", name)]
+    names = [name for name in map(str, group) if re.fullmatch(f"{word}[0-9]{{1,6}}", name)]
     children = [_child(file, group, name) for name in sorted(names, key=lambda name: int(name[len(word) :]))]
     return [child for child in children if hasattr(child, "keys")]
 
