@@ -489,11 +489,11 @@ MESHES = [
         "mesh",
         ("mesh.vertices", "nan"),
     ),
-    BadFile(
-        "transparent by d", obj_of("Kd 1 0 0\nd 0.5"), "mesh", ("a.obj", "opaque", "d 0.5", "set it to 1")
-    ),
-    BadFile("transparent by Tr", obj_of("Kd 1 0 0\nTr 0.5"), "mesh", ("opaque", "Tr 0.5", "set it to 0")),
-    BadFile("transparent by a halo", obj_of("d -halo 0.5"), "mesh", ("opaque", "d -halo 0.5")),
+    BadFile("d above 1", obj_of("Kd 1 0 0\nd 1.5"), "mesh", ("a.obj", "d as one number in 0..1", "d 1.5")),
+    BadFile("Tr below 0", obj_of("Kd 1 0 0\nTr -1"), "mesh", ("a.obj", "Tr as one number in 0..1", "Tr -1")),
+    BadFile("d of 0", obj_of("Kd 1 0 0\nd 0"), "mesh", ("a.obj", "opacity of 0 by d")),
+    BadFile("d against Tr", obj_of("Kd 1 0 0\nd 1\nTr 1"), "mesh", ("a.obj", "d = 1 - Tr", "d 1 and Tr 1")),
+    BadFile("transparent by a halo", obj_of("d -halo 0.5"), "mesh", ("one number", "d -halo 0.5")),
     BadFile("transparent by a map", obj_of("Kd 1 0 0\nmap_d b.png"), "mesh", ("map_d b.png", "remove map_d")),
     BadFile("Kd above 1", obj_of("Kd 255 0 0"), "mesh", ("a.obj", "Kd of 3 numbers in 0..1", "255.0")),
     BadFile("Kd of one number", obj_of("Kd 0.5"), "mesh", ("a.mtl", "3 numbers for Kd", "'Kd 0.5'")),

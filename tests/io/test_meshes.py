@@ -1,5 +1,6 @@
-"""Meshes from files: positions exact, colours as numbers, transforms applied, transparency refused."""
+"""Meshes from files: positions exact, colours and opacities as numbers, transforms applied."""
 
+import dataclasses
 import json
 
 import numpy as np
@@ -13,6 +14,7 @@ from tests.bad_files import obj_of
 from volref.errors import FormatError, SceneError
 from volref.io import load_mesh, load_meshes, save_mesh
 from volref.scene import Mesh
+from volref.stages.surface import surface_normals
 
 CORNERS = np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)], np.float64)
 FACES = np.array([(0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2)])
@@ -92,20 +94,85 @@ def test_texture_coordinates_without_a_material_give_the_plain_grey():
     assert mesh.colors.tolist() == [0.8, 0.8, 0.8]
 
 
-@pytest.mark.parametrize("what", ["vertex", "texture", "material"])
-def test_transparency_is_refused_with_a_sentence(tmp_path, what):
-    codes = CODES.copy()
-    codes[2, 3] = 254
-    if what == "vertex":
-        mesh = tetrahedron(vertex_colors=codes)
-    else:
-        clear = Image.fromarray(codes.reshape(2, 2, 4)) if what == "texture" else None
-        factor = None if what == "texture" else (1.0, 1.0, 1.0, 0.5)
-        material = trimesh.visual.material.PBRMaterial(baseColorTexture=clear, baseColorFactor=factor)
-        mesh = tetrahedron(visual=trimesh.visual.TextureVisuals(CORNERS[:, :2], material))
-    mesh.export(tmp_path / "a.glb")
-    with pytest.raises(FormatError, match="must be opaque, got an alpha of"):
-        load_mesh(tmp_path / "a.glb")
+def gltf_mesh(folder, image=None, factor=None, **options):
+    """Return the tetrahedron as a GLB file with such a material gives it."""
+    picture = None if image is None else Image.fromarray(image)
+    material = trimesh.visual.material.PBRMaterial(
+        baseColorTexture=picture, baseColorFactor=factor, **options
+    )
+    tetrahedron(visual=trimesh.visual.TextureVisuals(CORNERS[:, :2], material)).export(folder / "a.glb")
+    return load_mesh(folder / "a.glb")
+
+
+CLEAR_CODES = np.where(np.arange(4) == 3, [[255], [0], [64], [128]], CODES).astype(np.uint8)
+
+
+@pytest.mark.parametrize("kind", ["vertex", "face"])
+def test_alphas_of_vertices_and_faces_are_kept(tmp_path, kind):
+    tetrahedron(**{f"{kind}_colors": CLEAR_CODES}).export(tmp_path / "a.ply")
+    mesh = load_mesh(tmp_path / "a.ply")
+    assert mesh.coloring == kind
+    assert mesh.transparent
+    assert np.array_equal(mesh.colors, CLEAR_CODES / 255)
+
+
+def test_alphas_of_a_gltf_material_count_where_it_is_blended(tmp_path):
+    mesh = gltf_mesh(tmp_path, factor=(255, 0, 51, 102), alphaMode="BLEND")
+    assert mesh.colors.tolist() == [1, 0, 0.2, 0.4]
+    image = CLEAR_CODES.reshape(2, 2, 4)
+    mesh = gltf_mesh(tmp_path, image, factor=(255, 255, 255, 102), alphaMode="BLEND")
+    assert np.array_equal(mesh.texture, image / 255)
+    assert mesh.opacity == 0.4
+
+
+@pytest.mark.parametrize("stated", [{}, {"alphaMode": "OPAQUE"}])
+def test_alphas_of_a_gltf_material_mean_nothing_where_it_is_opaque(tmp_path, stated):
+    mesh = gltf_mesh(tmp_path, factor=(255, 0, 51, 102), **stated)
+    assert mesh.colors.tolist() == [1, 0, 0.2]
+    image = CLEAR_CODES.reshape(2, 2, 4)
+    mesh = gltf_mesh(tmp_path, image, **stated)
+    assert np.array_equal(mesh.texture, image[..., :3] / 255)
+    assert not mesh.transparent
+
+
+def test_cut_outs_are_refused(tmp_path):
+    assert not gltf_mesh(tmp_path, factor=(255, 0, 0, 255), alphaMode="MASK").transparent
+    with pytest.raises(FormatError, match="must have no cut-outs, got a material with alphaMode MASK"):
+        gltf_mesh(tmp_path, factor=(255, 0, 0, 254), alphaMode="MASK")
+
+
+@pytest.mark.parametrize(("stated", "sides"), [(None, "front"), (False, "front"), (True, "both")])
+def test_the_back_of_a_gltf_material_shows_if_it_is_double_sided(tmp_path, stated, sides):
+    assert gltf_mesh(tmp_path, factor=(255, 0, 0, 255), doubleSided=stated).sides == sides
+    tetrahedron().export(tmp_path / "a.glb")
+    assert load_mesh(tmp_path / "a.glb").sides == "both"  # no material says anything
+
+
+@pytest.mark.parametrize("suffix", ["ply", "glb", "obj"])
+def test_normals_of_the_file_are_kept_and_none_are_made_up(tmp_path, suffix):
+    tetrahedron().export(tmp_path / f"a.{suffix}")
+    assert load_mesh(tmp_path / f"a.{suffix}").normals is None
+    normals = np.array([(0, 0, 1), (1, 0, 0), (0, 1, 0), (0, 0.6, 0.8)])
+    tetrahedron(vertex_normals=normals).export(tmp_path / f"b.{suffix}")
+    mesh = load_mesh(tmp_path / f"b.{suffix}")
+    # Files hold float32, or 8 decimals; OBJ splits vertices, so compare by corner.
+    np.testing.assert_allclose(mesh.normals[mesh.faces], normals[FACES], rtol=0, atol=1e-7)
+
+
+def test_normals_stay_across_a_surface_that_is_stretched_and_mirrored(tmp_path):
+    """A mirrored body stays right side out: its flat normals agree with its vertex normals."""
+    smooth = trimesh.creation.icosphere(subdivisions=2)
+    smooth = trimesh.Trimesh(smooth.vertices, smooth.faces, vertex_normals=smooth.vertices, process=False)
+    scene, matrix = trimesh.Scene(), np.diag([3.0, 1, -0.5, 1])
+    matrix[:3, :3] = matrix[:3, :3] @ trimesh.transformations.rotation_matrix(0.7, (1, 2, 3))[:3, :3]
+    scene.add_geometry(smooth, transform=matrix)
+    scene.export(tmp_path / "a.glb")
+    mesh = load_mesh(tmp_path / "a.glb")
+    flat = surface_normals(mesh, np.arange(len(mesh.faces)), np.full((len(mesh.faces), 3), 1 / 3))
+    a, b, c = (mesh.vertices[mesh.faces[:, k]] for k in range(3))
+    across = np.cross(b - a, c - a)
+    cosine = (flat * across).sum(axis=1) / np.linalg.norm(across, axis=1)
+    assert cosine.min() > 0.95  # triangles of 1/4 radian on a sphere stretched 6 : 1
 
 
 def test_the_scene_graph_places_each_copy_of_a_mesh(tmp_path):
@@ -183,10 +250,19 @@ def test_a_gltf_that_asks_for_a_remote_buffer_is_refused(tmp_path):
 def random_mesh(seed, coloring):
     rng = np.random.default_rng(seed)
     vertices, faces = rng.normal(size=(6, 3)), rng.permutation(6).reshape(2, 3)
+    channels = rng.integers(3, 5)
+    style = {
+        "opacity": rng.uniform(0.1, 1),
+        "lit": rng.random() < 0.5,
+        "sides": rng.choice(["front", "back"]),
+    }
+    if rng.random() < 0.5:
+        style |= {"normals": rng.normal(size=(6, 3)), "back_color": rng.random(3)}
     if coloring == "texture":
-        return Mesh(vertices, faces, uv=rng.normal(size=(6, 2)), texture=rng.random((2, 3, 3)), wrap="clamp")
-    count = {"uniform": (3,), "vertex": (6, 3), "face": (2, 3)}[coloring]
-    return Mesh(vertices, faces, rng.random(count))
+        texture = rng.random((2, 3, channels))
+        return Mesh(vertices, faces, uv=rng.normal(size=(6, 2)), texture=texture, wrap="clamp", **style)
+    count = {"uniform": (channels,), "vertex": (6, channels), "face": (2, channels)}[coloring]
+    return Mesh(vertices, faces, rng.random(count), **style)
 
 
 @given(st.integers(0, 2**32), st.sampled_from(["uniform", "vertex", "face", "texture"]))
@@ -195,9 +271,8 @@ def test_npz_keeps_every_field_bit_for_bit(tmp_path_factory, seed, coloring):
     path = tmp_path_factory.mktemp("mesh") / "a.npz"
     save_mesh(mesh, path)
     again = load_mesh(path)
-    for name in ("vertices", "faces", "colors", "uv", "texture"):
-        assert np.array_equal(getattr(again, name), getattr(mesh, name))
-    assert (again.wrap, again.coloring) == (mesh.wrap, mesh.coloring)
+    for field in dataclasses.fields(Mesh):
+        assert np.array_equal(getattr(again, field.name), getattr(mesh, field.name)), field.name
 
 
 def test_a_broken_npz_mesh_breaks_the_rules_of_mesh(tmp_path):
@@ -228,9 +303,23 @@ def test_a_factor_of_102_in_a_glb_is_that_grey_and_not_the_default(tmp_path):
     assert load_mesh(tmp_path / "a.glb").colors.tolist() == [0.4, 0.4, 0.4]
 
 
-@pytest.mark.parametrize("opaque", ["d 1", "d 1.0000", "Tr 0", "d -halo 1", "Tf 1 1 1\nNi 1.5\nillum 2"])
-def test_an_opaque_material_is_read(tmp_path, opaque):
-    assert material_mesh(tmp_path, f"Kd 1 0 0\n{opaque}").colors.tolist() == [1, 0, 0]
+@pytest.mark.parametrize(
+    ("stated", "opacity"),
+    [
+        ("d 1", 1),
+        ("d 1.0000", 1),
+        ("Tr 0", 1),
+        ("d -halo 1", 1),
+        ("Tf 1 1 1\nNi 1.5\nillum 2", 1),
+        ("d 0.25", 0.25),
+        ("Tr 0.25", 0.75),
+        ("d 0.333\nTr 0.6667", 0.333),
+    ],
+)
+def test_a_material_states_its_opacity(tmp_path, stated, opacity):
+    mesh = material_mesh(tmp_path, f"Kd 1 0 0\n{stated}")
+    assert mesh.colors.tolist() == [1, 0, 0]
+    assert mesh.opacity == opacity
 
 
 def test_a_texture_with_the_default_grey_for_a_stated_tint_is_refused(tmp_path):

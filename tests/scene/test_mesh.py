@@ -1,3 +1,5 @@
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -101,3 +103,12 @@ def test_normals_of_vertices_that_no_triangle_uses_do_not_matter():
 def test_what_a_mesh_cannot_be_is_refused_in_one_sentence(options, sentence):
     with pytest.raises(SceneError, match=sentence):
         Mesh(QUAD, HALVES, **options)
+
+
+def test_a_mesh_from_elsewhere_can_be_given_another_look():
+    mesh = Mesh(QUAD, HALVES, np.eye(4)[:, :3], back_color=(1, 0, 0))
+    glass = dataclasses.replace(mesh, opacity=0.25, lit=True)
+    assert (glass.opacity, glass.lit, glass.transparent) == (0.25, True, True)
+    assert glass.coloring == "vertex"
+    assert glass.colors.tolist() == mesh.colors.tolist()
+    assert glass.back_color.tolist() == [1, 0, 0]

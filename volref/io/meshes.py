@@ -3,14 +3,13 @@
 8-bit colours are divided by 255 and not decoded.  volref's own .npz holds the fields of `Mesh` exactly.
 """
 
-import math
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
 
 import numpy as np
 
-from volref.arrays import Floats, Numbers
+from volref.arrays import Floats
 from volref.errors import FormatError
 from volref.io.guard import (
     DEFAULT_MAX_BYTES,
@@ -21,25 +20,24 @@ from volref.io.guard import (
     path_inside,
     wrapped,
 )
+from volref.io.materials import appearance, problems_of_mtl
 from volref.io.npy import read_npz, write_npz
 from volref.scene.mesh import Mesh
 from volref.scene.transform import transform_points
 
 # The formats that trimesh reads without a further package.
 SUFFIXES = (".obj", ".ply", ".stl", ".off", ".glb", ".gltf")
-ARRAYS = ("vertices", "faces", "colors", "uv", "texture")
-# How many numbers a line of an MTL file has (Wavefront; "Kd r" for r, r, r is not read by trimesh).
-MTL_COUNTS = {"kd": 3, "ka": 3, "ks": 3, "ns": 1}
-WORDS = ("wrap", "coloring")
+ARRAYS = ("vertices", "faces", "colors", "uv", "texture", "normals", "back_color")
+NUMBERS = ("opacity", "lit")
+WORDS = ("wrap", "coloring", "sides")
 
 
 def load_mesh(path: str | Path, *, process: bool = False, max_bytes: int = DEFAULT_MAX_BYTES) -> Mesh:
     """Return the one mesh in a file (.obj .ply .stl .off .glb .gltf, or volref's .npz), in world coordinates.
 
     Vertex colours, face colours, a texture with its coordinates, or the colour of a material are carried
-    over; a file without colours gives the grey of `Mesh`.  An OBJ material's Kd is taken as written, its
-    d, Tr and map_d must leave it opaque; trimesh rounds glTF's baseColorFactor to 8 bits.  The scene graph's
-    transforms are applied.  All meshes are opaque: transparency is refused, not dropped.
+    over with their alphas, see `volref.io.materials`; a file without colours gives the grey of `Mesh`.
+    Vertex normals are kept, but no file says that its mesh is lit.  The scene graph's transforms are applied.
 
     Parameters
     ----------
@@ -51,7 +49,7 @@ def load_mesh(path: str | Path, *, process: bool = False, max_bytes: int = DEFAU
     Raises
     ------
     FormatError
-        If the file cannot be read, holds several meshes (see `load_meshes`) or none, or is transparent.
+        If the file cannot be read, holds several meshes (see `load_meshes`) or none.
     SceneError
         If the mesh breaks a rule of `Mesh`.
     """
@@ -115,16 +113,13 @@ def save_mesh(mesh: Mesh, path: str | Path, *, overwrite: bool = False) -> None:
     if Path(path).suffix.lower() != ".npz":
         message = f"{Path(path).name} must end in .npz, got {Path(path).suffix!r}; rename it"
         raise FormatError(message)
-    arrays: dict[str, Numbers] = {"vertices": mesh.vertices, "faces": mesh.faces}
-    if mesh.uv is not None and mesh.texture is not None:
-        arrays |= {"uv": mesh.uv, "texture": mesh.texture}
-    arrays["colors"] = mesh.colors
-    words = {name: np.array(getattr(mesh, name)) for name in WORDS}
-    write_npz(path, {**arrays, **words}, overwrite=overwrite)
+    fields: dict[str, Any] = {name: getattr(mesh, name) for name in (*ARRAYS, *NUMBERS, *WORDS)}
+    arrays = {name: np.asarray(value) for name, value in fields.items() if value is not None}
+    write_npz(path, arrays, overwrite=overwrite)
 
 
 def _read_npz(file: Path, max_bytes: int) -> Mesh:
-    fields: dict[str, Any] = dict(read_npz(file, (*ARRAYS, *WORDS), max_bytes))
+    fields: dict[str, Any] = dict(read_npz(file, (*ARRAYS, *NUMBERS, *WORDS), max_bytes))
     missing = [name for name in ("vertices", "faces") if name not in fields]
     if missing:
         message = f"{file.name} must hold the arrays vertices and faces, got no {' and '.join(missing)}; "
@@ -149,24 +144,12 @@ def _resolver(file: Path, missing: list[str], wrong: list[str]) -> Foreign:
                 except (OSError, FormatError):
                     continue
                 if spelling.lower().endswith(".mtl"):
-                    wrong.extend(_problems_of_mtl(spelling, data))
+                    wrong.extend(problems_of_mtl(spelling, data))
                 return data
             missing.append(name)
             raise FileNotFoundError(name)
 
     return Beside(str(file))
-
-
-def _problems_of_mtl(name: str, data: bytes) -> list[str]:
-    """Return a sentence for each line for which trimesh would drop a colour, or all materials of the file."""
-    problems = []
-    for line in data.decode("utf-8", "replace").splitlines():
-        key, *words = line.split() or [""]
-        count = MTL_COUNTS.get(key.lower())
-        if count is not None and (len(words) != count or None in map(_number_in, words)):
-            message = f"{one_line(name)} must have {count} number{'s' * (count > 1)} for {key}, got "
-            problems.append(message + f"{one_line(line.strip())!r}; mend it")
-    return problems
 
 
 def _mesh_of(file: Path, part: Foreign, matrix: Floats) -> Mesh:
@@ -175,82 +158,17 @@ def _mesh_of(file: Path, part: Foreign, matrix: Floats) -> Mesh:
         message = f"{file.name} must hold triangles, got {type(part).__name__} without; "
         raise FormatError(message + "remove it or triangulate it")
     vertices = transform_points(matrix, np.asarray(part.vertices, dtype=np.float64))
-    return Mesh(vertices, np.asarray(faces), **_appearance(file, part.visual))
+    mirrored = float(np.linalg.det(matrix[:3, :3])) < 0
+    # A mirrored body would be inside out.
+    corners = np.asarray(faces)[:, ::-1] if mirrored else np.asarray(faces)
+    return Mesh(vertices, corners, normals=_normals(part, matrix), **appearance(file, part.visual))
 
 
-def _appearance(file: Path, visual: Foreign) -> dict[str, Any]:
-    """Return the arguments of `Mesh` that say what colour it has."""
-    kind = visual.kind if visual.defined else None
-    if kind in ("vertex", "face"):
-        codes = np.asarray(visual.vertex_colors if kind == "vertex" else visual.face_colors)
-        return {"colors": _opaque(file, codes), "coloring": kind}
-    if kind != "texture":
-        return {}
-    material = visual.material
-    image = getattr(material, "baseColorTexture", None) or getattr(material, "image", None)
-    _check_material(file, material)
-    if _is_made_up(material):
-        return {}
-    tint = _tint(file, material)
-    if image is None:
-        return {} if tint is None else {"colors": tint}
-    if visual.uv is None:
-        message = f"{file.name} must have texture coordinates for its texture, got none; export them"
-        raise FormatError(message)
-    if tint is not None and (tint != 1).any():
-        message = f"{file.name} must not tint its texture, got the factor {tint.tolist()}; "
-        raise FormatError(message + "set it (Kd, baseColorFactor) to 1 or multiply it into the texture")
-    codes = np.asarray(image.convert("RGBA"))
-    return {"uv": np.asarray(visual.uv, dtype=np.float64), "texture": _opaque(file, codes)}
-
-
-def _tint(file: Path, material: Foreign) -> Floats | None:
-    """Return the colour (3,) that a material states, None if it states none."""
-    factor = getattr(material, "baseColorFactor", None)
-    if factor is not None:
-        return _opaque(file, np.asarray(factor))
-    # Not `material.diffuse`: trimesh fills in a grey there where an OBJ material has no Kd.
-    stated = getattr(material, "kwargs", {}).get("kd")
-    if stated is None:
+def _normals(part: Foreign, matrix: Floats) -> Floats | None:
+    """Return the vertex normals of the file in the world, None where it has none."""
+    # trimesh makes up normals when asked for them, and keeps those of the file where it would keep these.
+    if "vertex_normals" not in part._cache:
         return None
-    color = np.asarray(stated, dtype=np.float64)
-    if ((color >= 0) & (color <= 1)).all():
-        return color
-    message = f"{file.name} must have a Kd of 3 numbers in 0..1, got {color.tolist()}; mend its .mtl file"
-    raise FormatError(message)
-
-
-def _check_material(file: Path, material: Foreign) -> None:
-    """Refuse the transparency of an OBJ material, which trimesh does not read: d, Tr = 1 - d, and map_d."""
-    stated: dict[str, list[str]] = getattr(material, "kwargs", {})
-    for key, spelling, opaque in (("d", "d", 1.0), ("tr", "Tr", 0.0), ("map_d", "map_d", math.nan)):
-        # The last word: "d -halo 0.5" has an option before the number.
-        if key in stated and _number_in(stated[key][-1]) != opaque:
-            message = f"{file.name} must be opaque, got a material with {spelling} "
-            message += f"{one_line(' '.join(stated[key]))}; "
-            cure = f"remove {spelling}" if math.isnan(opaque) else f"set it to {opaque:g}"
-            raise FormatError(message + cure + " (meshes are opaque in this version)")
-
-
-def _number_in(text: str) -> float | None:
-    try:
-        return float(text)
-    except ValueError:
-        return None
-
-
-def _is_made_up(material: Foreign) -> bool:
-    """Say whether trimesh made the material up, for texture coordinates without one: it is a 2 x 2 image."""
-    from trimesh.visual.material import empty_material
-
-    usual = empty_material()
-    image = getattr(material, "image", None)
-    return image is not None and image.size == usual.image.size and hash(material) == hash(usual)
-
-
-def _opaque(file: Path, codes: Numbers) -> Floats:
-    """Return colours in 0..1 of 8-bit RGBA codes (..., 4)."""
-    if (codes[..., 3] < 255).any():
-        message = f"{file.name} must be opaque, got an alpha of {int(codes[..., 3].min())} of 255; "
-        raise FormatError(message + "set its alpha to 1 (meshes are opaque in this version)")
-    return np.asarray(codes[..., :3] / 255.0)
+    normals = np.asarray(part.vertex_normals, dtype=np.float64)
+    # Normals stay across their surface if it is stretched: n . (M^-1 M t) = (M^-T n) . (M t).
+    return np.asarray(normals @ np.linalg.inv(matrix[:3, :3]))

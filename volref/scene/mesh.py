@@ -7,7 +7,7 @@ Texture coordinates run like OBJ's and glTF's as trimesh hands them on: u to the
 v = 1 is the top row of the image.  Texels have centres; a texture 2 wide has them at u = 0.25 and 0.75.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -61,7 +61,8 @@ class Mesh:
     back_color
         Colour (3,) of the back sides in place of their own.
 
-    The field `transparent` says whether any of the mesh lets light through.
+    The field `transparent` says whether any of the mesh lets light through.  `dataclasses.replace` gives a
+    mesh another look, as to one from a file.
 
     Raises
     ------
@@ -87,8 +88,8 @@ class Mesh:
     normals: Floats | None
     sides: str
     back_color: Floats | None
-    transparent: bool
-    dropped: int
+    transparent: bool = field(init=False)
+    dropped: int = field(init=False)
 
     def __init__(
         self,
