@@ -74,6 +74,17 @@ def test_radars_are_taken_at_their_own_times():
     assert series.at(40) is radars[1]
 
 
+def test_radars_are_mixed_gate_by_gate():
+    low, high = (
+        RadarVolume([Sweep([0, 120, 240], e, np.full((3, 2), dbz), 500, 1000) for e in (1, 2)])
+        for dbz in (10.0, 30.0)
+    )
+    mixed = Series([low, high], [0, 60]).at(15, "linear")
+    assert mixed.sweeps[1].values.tolist() == [[15, 15]] * 3
+    with pytest.raises(SceneError, match="must be of one kind to be mixed"):
+        Series([low, VOLUMES[0]], [0, 60]).at(15, "linear")
+
+
 @pytest.mark.parametrize(
     ("call", "fragment"),
     [

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from volref.arrays import Floats, float_array, number, one_of, set_fields
 from volref.errors import SceneError
 from volref.scene.radar import RadarVolume
+from volref.scene.radar_mixing import between
 from volref.scene.volume import Volume
 
 INTERPOLATIONS = ("nearest", "linear")
@@ -67,7 +68,8 @@ class Series:
         """Return the field at a time between the first and the last.
 
         "nearest": the volume nearest in time, halfway the earlier one.  "linear": each voxel mixed linearly
-        between the two volumes around, in float64; at the time of a volume that volume itself.  A pattern
+        between the two volumes around, in float64, and each gate of radars as
+        `volref.scene.radar_mixing.between` has it; at the time of a volume that volume itself.  A pattern
         that moves fades out here and in there under it, and does not move.
 
         Raises
@@ -97,13 +99,13 @@ class Series:
         return volume
 
 
-def mixed(first: Frame, second: Frame, weight: float) -> Volume:
-    """Return the volume of (1 - weight) first + weight second, in float64.
+def mixed(first: Frame, second: Frame, weight: float) -> Frame:
+    """Return the volume of (1 - weight) first + weight second, in float64; radars gate by gate.
 
     Raises
     ------
     SceneError
-        If they have different sizes or lie in different places, or are radars.
+        If they have different sizes, lie in different places, or one is a radar and the other is not.
 
     Examples
     --------
@@ -111,9 +113,11 @@ def mixed(first: Frame, second: Frame, weight: float) -> Volume:
     >>> mixed(dark, bright, 0.25).values.tolist()
     [[[50.0, 50.0]]]
     """
-    if not isinstance(first, Volume) or not isinstance(second, Volume):
-        message = "series.volumes must be boxes to be mixed, got radars; use interpolation='nearest'"
-        raise SceneError(message)
+    if isinstance(first, RadarVolume) and isinstance(second, RadarVolume):
+        return between(first, second, weight)
+    if isinstance(first, RadarVolume) or isinstance(second, RadarVolume):
+        message = "series.volumes must be of one kind to be mixed, got a box and a radar; "
+        raise SceneError(message + "use interpolation='nearest'")
     if first.values.shape != second.values.shape or _place(first) != _place(second):
         message = f"series.volumes must lie in one place to be mixed, got {_spelled(first)} and "
         raise SceneError(message + f"{_spelled(second)}; resample them, or use interpolation='nearest'")
