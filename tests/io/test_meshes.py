@@ -12,7 +12,7 @@ from PIL import Image
 
 from tests.bad_files import obj_of
 from volref.errors import FormatError, SceneError
-from volref.io import load_mesh, load_meshes, save_mesh
+from volref.io import load_mesh, load_meshes, load_scene, save_mesh
 from volref.scene import Mesh
 from volref.stages.surface import surface_normals
 
@@ -331,3 +331,29 @@ def test_a_texture_with_the_default_grey_for_a_stated_tint_is_refused(tmp_path):
         load_mesh(tmp_path / "a.obj")
     (tmp_path / "a.mtl").write_text("newmtl m\nmap_Kd b.png\n")
     assert load_mesh(tmp_path / "a.obj").coloring == "texture"
+
+
+def test_a_scene_file_says_how_its_meshes_look(tmp_path):
+    style = {
+        "opacity": 0.5,
+        "lit": True,
+        "normals": [[0, 0, 1]] * 4,
+        "sides": "front",
+        "back_color": [0, 0, 1],
+        "colors": [[1, 0, 0, 0.25]] * 4,
+        "coloring": "vertex",
+    }
+    camera = {"kind": "perspective", "eye": [0, 0, 5], "target": [0, 0, 0], "up": [0, 1, 0]}
+    document = {
+        "format": "volref-scene",
+        "format_version": 1,
+        "width": 4,
+        "height": 3,
+        "camera": {**camera, "fov_y": 40.0, "near": 0.1, "far": 10.0},
+        "meshes": [{"vertices": CORNERS.tolist(), "faces": FACES.tolist(), **style}],
+    }
+    (tmp_path / "scene.json").write_text(json.dumps(document))
+    (mesh,) = load_scene(tmp_path / "scene.json").meshes
+    expected = Mesh(CORNERS, FACES, **style)
+    for field in dataclasses.fields(Mesh):
+        assert np.array_equal(getattr(mesh, field.name), getattr(expected, field.name)), field.name
