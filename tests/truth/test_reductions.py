@@ -57,7 +57,8 @@ def assert_certified(out, volume, transfer, mode, rays, *, begin=0.0, distance=n
                 t = first_meeting(mp, isovalue, *ray)
                 color = [table_value(transfer.values, c, isovalue) for c in transfer.colors.T]
                 truth = BEHIND if t is None else (*color, 1.0)
-                off = 0.0 if t is None and out.hit[k] == np.inf else abs(out.hit[k] - (t or mp.inf))
+                hit = np.inf if t is None else t
+                off = 0.0 if hit == out.hit[k] else abs(hit - out.hit[k])
                 assert off <= out.off[k], (k, float(off), out.off[k])
             else:
                 value = reduced_value(mp, mode, *ray)

@@ -72,8 +72,10 @@ def first_crossing(pieces: Pieces, middle: Floats, off: Floats, isovalue: float)
     # Where the ray starts within w of it, the true one may start on the other side.
     either = np.abs(start) <= width.take(first)
     found.latest[pieces.ray.take(first[either])] = np.inf
+    # Constant at the isovalue: met where the ray surely is in that cell.
     flat = np.flatnonzero((size == 0) & (pieces.slack == 0) & (pieces.astray < 1))
-    np.minimum.at(found.latest, pieces.ray.take(flat), (middle + 0.5 * pieces.length).take(flat))
+    sure = middle.take(flat) + (pieces.astray.take(flat) - 0.5) * pieces.length.take(flat)
+    np.minimum.at(found.latest, pieces.ray.take(flat), sure)
     return found
 
 

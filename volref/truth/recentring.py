@@ -29,17 +29,16 @@ def recentred_spans(
     moved, rests, kept = recentred(origins, directions, spans, PAD)  # empty spans keep their origins
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         faces = [(face[:, None] + PAD - moved) / directions for face in (low, high)]
-        errors = np.abs(rests / directions)
+        errors = np.abs(rests / directions) * (1 + 4 * ROUNDOFF)
     parallel = directions == 0
     errors[parallel] = 0.0
-    near = np.where(parallel, -np.inf, np.minimum(*faces))
-    far = np.where(parallel, np.inf, np.maximum(*faces))
-    near_axis, far_axis = near.argmax(axis=0)[None], far.argmin(axis=0)[None]
-    at_near, at_far = (np.take_along_axis(errors, axis, axis=0)[0] for axis in (near_axis, far_axis))
-    near, far = near.max(axis=0), far.min(axis=0)
+    sides = np.where(parallel, -np.inf, np.minimum(*faces)), np.where(parallel, np.inf, np.maximum(*faces))
+    off = [np.where(np.isfinite(side), errors + 3 * ROUNDOFF * np.abs(side), 0.0) for side in sides]
+    near, far = sides[0].max(axis=0), sides[1].min(axis=0)
+    # Near an edge of the box the face that the ray truly meets first may be another one.
+    at_near = np.maximum(near - (sides[0] - off[0]).max(axis=0), (sides[0] + off[0]).max(axis=0) - near)
+    at_far = np.maximum(far - (sides[1] - off[1]).min(axis=0), (sides[1] + off[1]).min(axis=0) - far)
     inside = spans.t_far > spans.t_near
-    at_near += 3 * ROUNDOFF * np.abs(near)
-    at_far += 3 * ROUNDOFF * np.abs(far)
     # Where a ray begins, and a surface, are what they are, unless rounding alone puts them before a face.
     at_face = spans.t_near > begin, spans.t_far < distance
     at_near[~(inside & (at_face[0] | (near + at_near > kept.t_near)))] = 0.0

@@ -193,8 +193,8 @@ def _ways(
     longest = np.maximum(ends.t_near, ends.t_far)
     error = position_error(grid, moved, directions, spans)
     off = grid.steepest * (6 * error + longest * np.abs(directions).sum(axis=0))
-    touching = ~inside & (ends.t_near > 0)
     inside &= spans.t_far > spans.t_near
+    touching = ~inside & (ends.t_near + ends.t_far > 0)
     doubtful = inside & (spans.t_far - spans.t_near <= ends.t_near + ends.t_far)
     return _Ways(moved, rests, directions, spans, ends, middle, off, touching, doubtful)
 
@@ -266,7 +266,8 @@ def _mean(prepared: Reducible, ways: _Ways, *, precise: bool) -> tuple[Estimates
     # A ray that only touches the box may see the value there.
     at = np.flatnonzero(ways.touching)
     found.value[at] = _values_at(prepared, ways, ways.spans.t_near)[at]
-    found.least[at], found.most[at] = found.value[at] - ways.off[at], found.value[at] + ways.off[at]
+    off = ways.off[at] + 16 * ROUNDOFF * np.abs(found.value[at])
+    found.least[at], found.most[at] = found.value[at] - off, found.value[at] + off
     return found, len(pieces.ray)
 
 

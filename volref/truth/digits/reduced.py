@@ -55,13 +55,15 @@ def reduced_value(
             total += (t1 - t0) * (c0 + c1 / 2 + c2 / 3 + c3 / 4)
             length += t1 - t0
         return _rounded(mp, total / length)
+    low, high = volume.value_bounds
     values = (
         evaluate(rounded, u)
         for _, _, cubic in cells
         for rounded in [[_rounded(mp, c) for c in cubic]]
         for u in (mp.zero, *turning_points(mp, rounded), mp.one)
     )
-    return max(values) if mode == "mip" else min(values)
+    # Interpolated values are means, which rounding must not put on the other side of a jump.
+    return min(max(values), mp.mpf(high)) if mode == "mip" else max(min(values), mp.mpf(low))
 
 
 def first_meeting(
