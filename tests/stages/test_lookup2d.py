@@ -35,7 +35,7 @@ def test_the_centres_of_entries_give_the_entries_themselves():
 def test_no_lookup_leaves_the_range_of_its_table(seed):
     random = np.random.default_rng(seed)
     # Opacities of 1 and just below it: rounded past 1, they would have no extinction.
-    rgba = random.choice([0.0, 1 - 2.0**-53, 1.0], (3, 3, 4))
+    rgba = random.choice([0.0, 2.0**-60, 0.1, 1 - 2.0**-53, 1.0], (3, 3, 4))
     table = TransferFunction2D(rgba, (0, 1), (0, 1))
     colors, opacity = lookup_2d(table, random.random(50), random.random(50))
     assert colors.min() >= 0

@@ -18,7 +18,8 @@ def lookup_2d(table: TransferFunction2D, values: Floats, magnitudes: Floats) -> 
     """Return straight colours (3, n) and opacities per unit distance (n,), bilinear between the entries.
 
     Across columns first, then between the two rows: each time below + part (above - below), which is exact
-    where both are equal, and held between them, because a rounded opacity above 1 has no logarithm.
+    where both are equal.  Its rounding leaves 0..1 nowhere: part is less than 1 by at least as much as the
+    difference can be too large.
 
     Examples
     --------
@@ -72,5 +73,4 @@ def _place(x: Floats, domain: tuple[float, float], count: int) -> tuple[Indices,
 
 
 def _mix(below: Floats, above: Floats, part: Floats) -> Floats:
-    mixed = below + part * (above - below)
-    return np.asarray(np.clip(mixed, np.minimum(below, above), np.maximum(below, above)))
+    return np.asarray(below + part * (above - below))
