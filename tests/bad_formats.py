@@ -126,6 +126,17 @@ def huge_tiff(folder):
     return folder / "a.tif"
 
 
+def looped_tiff(folder):
+    """Write a TIFF whose only directory says that it is the next one, too."""
+    path = tiff_of(metadata=None)(folder)
+    data = bytearray(path.read_bytes())
+    start = struct.unpack_from("<I", data, 4)[0]
+    count = struct.unpack_from("<H", data, start)[0]
+    struct.pack_into("<I", data, start + 2 + 12 * count, start)
+    path.write_bytes(data)
+    return path
+
+
 def hdf5_of(write):
     def build(folder):
         with h5py.File(folder / "a.h5", "w") as archive:
@@ -325,6 +336,7 @@ DICOM = [
         "volume",
         ("JPEG-LS", "install pylibjpeg"),
     ),
+    BadFile("no transfer syntax", dicom_of(with_syntax("1.2.3")), "volume", ("0.dcm", "transfer syntax")),
     BadFile(
         "MPEG DICOM", dicom_of(with_syntax("1.2.840.10008.1.2.4.100")), "volume", ("MPEG2", "uncompressed")
     ),
@@ -333,6 +345,7 @@ DICOM = [
 TIFF = [
     BadFile("not a TIFF", file_of("a.tif", b"hello"), "volume", ("a.tif", "readable TIFF")),
     BadFile("truncated TIFF", cut(tiff_of(), 99), "volume", ("a.tif",), {"spacing": (1, 1, 1)}),
+    BadFile("TIFF pages in a loop", looped_tiff, "volume", ("overlap", "write the file again")),
     BadFile("TIFF without spacing", tiff_of(), "volume", ("spacing", "got none", "pass spacing=")),
     BadFile(
         "OME without z",

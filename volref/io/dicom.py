@@ -151,6 +151,7 @@ def _check_slice(pydicom: ModuleType, file: Path, header: Foreign) -> None:
         frames, samples = int(header.get("NumberOfFrames") or 1), int(header.get("SamplesPerPixel") or 1)
         lookup = "ModalityLUTSequence" in header
         syntax = header.file_meta.get("TransferSyntaxUID")
+        packed = syntax is not None and pydicom.uid.UID(syntax).is_encapsulated
         bits = int(header.get("BitsAllocated") or 0)
     if frames > 1:
         message = f"{file.name} must hold one slice, got {frames} frames (multi-frame DICOM); "
@@ -169,7 +170,7 @@ def _check_slice(pydicom: ModuleType, file: Path, header: Foreign) -> None:
     if syntax is None:
         message = f"{file.name} must state its transfer syntax, got none; write the file again"
         raise FormatError(message)
-    if pydicom.uid.UID(syntax).is_encapsulated:
+    if packed:
         _check_decoder(pydicom, file, syntax)
 
 

@@ -5,6 +5,7 @@ paper and not used.  Rows are y and stay in their order.
 """
 
 import math
+import struct
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -31,6 +32,8 @@ from volref.io.guard import (
 KINDS = ("imagej", "ome", "shaped", "generic", "uniform")
 # Unknown sequences of pages are slices: I and Q are tifffile's names for them.
 STACKS = ("YX", "ZYX", "IYX", "QYX")
+# Of TIFF and BigTIFF: where the first directory is named, its count, the bytes of an entry, an offset.
+DIRECTORY = {42: (4, "H", 12, "I"), 43: (8, "Q", 20, "Q")}
 GREY = ("MINISBLACK", "MINISWHITE", "PALETTE")
 DEFLATES = ("ADOBE_DEFLATE", "DEFLATE")
 
@@ -47,10 +50,43 @@ def read_tiff(path: str | Path, max_bytes: int) -> tuple[Numbers, dict[str, Any]
     """
     tifffile = extra("tifffile", "TIFF", "tifffile")
     file = existing_file(path)
+    _check_directories(file)
     # Not several files: OME text names them by any path.
     with wrapped(file, "TIFF stack"), tifffile.TiffFile(str(file), _multifile=False) as tiff:
         series = _only_stack(file, tiff)
         return _samples(tifffile, file, tiff, series, max_bytes), _spacing(file, tiff)
+
+
+def _check_directories(file: Path) -> None:
+    """Refuse directories of pages that overlap or lead back to each other: tifffile follows them for ever.
+
+    A directory is a count, that many entries, and the offset of the next (TIFF 6.0, section 2; BigTIFF).
+    """
+    size = file.stat().st_size
+    with wrapped(file, "TIFF stack"), file.open("rb") as stream:
+        head = stream.read(16)
+        order = {b"II": "<", b"MM": ">"}.get(head[:2])
+        version = struct.unpack(order + "H", head[2:4])[0] if order and len(head) == 16 else 0
+        if order is None or version not in DIRECTORY:
+            message = f"{file.name} must be a readable TIFF stack, got other bytes at its start; "
+            raise FormatError(message + "check its suffix")
+        at, count, entry, link = DIRECTORY[version]
+        place, taken = struct.unpack_from(order + link, head, at)[0], 0
+        while place:
+            stream.seek(place)
+            found = stream.read(struct.calcsize(count))
+            entries = struct.unpack(order + count, found)[0] if len(found) == struct.calcsize(count) else size
+            taken += len(found) + entries * entry + struct.calcsize(link)
+            if taken > size:
+                message = (
+                    f"{file.name} must have a directory for each page, got some that overlap or are cut; "
+                )
+                raise FormatError(message + "write the file again")
+            stream.seek(place + len(found) + entries * entry)
+            following = stream.read(struct.calcsize(link))
+            place = (
+                struct.unpack(order + link, following)[0] if len(following) == struct.calcsize(link) else 0
+            )
 
 
 def _only_stack(file: Path, tiff: Foreign) -> Foreign:
