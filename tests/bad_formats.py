@@ -76,6 +76,14 @@ def two_series(folder):
     return folder
 
 
+def foreign_syntax(folder):
+    """Write a series whose transfer syntax is a UID of something else."""
+    for file in write_series(folder, F, PLACE).iterdir():
+        syntax, other = b"1.2.840.10008.1.2.1\0", b"1.2.840.10008.1.1\0\0\0"
+        file.write_bytes(file.read_bytes().replace(syntax, other))
+    return folder
+
+
 def cut_dicom(folder):
     write_series(folder, F, PLACE)
     file = sorted(folder.iterdir())[1]
@@ -336,7 +344,7 @@ DICOM = [
         "volume",
         ("JPEG-LS", "install pylibjpeg"),
     ),
-    BadFile("no transfer syntax", dicom_of(with_syntax("1.2.3")), "volume", ("0.dcm", "transfer syntax")),
+    BadFile("no transfer syntax", foreign_syntax, "volume", ("slice0.dcm", "transfer syntax")),
     BadFile(
         "MPEG DICOM", dicom_of(with_syntax("1.2.840.10008.1.2.4.100")), "volume", ("MPEG2", "uncompressed")
     ),
