@@ -142,6 +142,13 @@ def test_transparent_lit_meshes_are_lit_layer_by_layer():
     np.testing.assert_allclose(layers.color[1::2], expected, rtol=0, atol=10 * 100 * 2.0**-52)  # as above
 
 
+def test_meshes_answer_lights_where_the_volume_does_not():
+    unlit, plain = (
+        visible_surface(scene_of(ball(), "top", given)).color for given in (Material("unlit"), None)
+    )
+    np.testing.assert_array_equal(unlit, plain)
+
+
 def test_without_lights_or_without_being_lit_colours_stay_as_they_are():
     sphere = sphere_mesh(RADIUS)
     plain = Mesh(sphere.vertices, sphere.faces, COLOR)

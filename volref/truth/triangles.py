@@ -131,7 +131,9 @@ def _lit(
     """Return the lit colours (n, 3) of the rays `its`."""
     directions = rays.directions[its]
     points = rays.origins[its] + distance[:, None] * directions
-    material = Material() if scene.material is None else scene.material
+    material = scene.material
+    if material is None or material.model == "unlit":
+        material = Material()
     return lit_colors(scene.lights, material, points.T, normals.T, -directions.T, straight.T).T
 
 
