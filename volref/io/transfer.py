@@ -36,8 +36,8 @@ FORMAT = "volref-transfer"
 # What each kind of file may be told.
 OPTIONS = {
     "volref": (),
-    "table": ("domain", "magnitude_domain", "unit_distance", "texel_centers", "interpolation", "units"),
-    "table of two dimensions": ("domain", "magnitude_domain", "unit_distance", "units"),
+    "entries": ("domain", "magnitude_domain", "unit_distance", "texel_centers", "interpolation", "units"),
+    "entries in rows": ("domain", "magnitude_domain", "unit_distance", "units"),
     "ParaView": ("key", "domain", "unit_distance", "units"),
     "Slicer": ("key", "unit_distance", "mean_spacing", "units"),
     "Slicer .vp.json": ("unit_distance", "mean_spacing", "units"),
@@ -108,7 +108,7 @@ def load_transfer(
     file = existing_file(path)
     suffix = file.suffix.lower()
     if suffix in (".npy", ".png"):
-        _refuse_others(file, "table", given)
+        _refuse_others(file, "entries", given)
         return _transfer_of_table(file, given)
     if suffix != ".json":
         message = f"{one_line(file.name)} must end in .json, .npy or .png, got {file.suffix!r}; convert it"
@@ -208,9 +208,10 @@ def _refuse_others(file: Path, kind: str, given: dict[str, Any]) -> None:
     """Refuse an option that this kind of file has no use for."""
     for name, value in given.items():
         if name not in OPTIONS[kind]:
-            takes = f"takes {', '.join(OPTIONS[kind])}" if OPTIONS[kind] else "states all itself"
+            takes = f"leave it out, a file of {kind} takes {', '.join(OPTIONS[kind])}"
+            cure = takes if OPTIONS[kind] else "change the file, which states all itself"
             message = f"{file.name} must be loaded without {name}, got {one_line(repr(value))}; "
-            raise FormatError(message + f"leave it out: a file of this kind {takes}")
+            raise FormatError(message + cure)
 
 
 def _chosen(file: Path, document: Foreign, name: str, key: str | None) -> Foreign:
@@ -251,7 +252,7 @@ def _transfer_of_table(file: Path, given: dict[str, Any]) -> AnyTransfer:
         message = f"{file.name} must be given a magnitude_domain, got none for a table of {len(table)} rows; "
         raise FormatError(message + "pass magnitude_domain=(first magnitude, last magnitude)")
     heights = checked_domain("transfer.magnitude_domain", layout.pop("magnitude_domain"))
-    _refuse_others(file, "table of two dimensions", given)
+    _refuse_others(file, "entries in rows", given)
     return TransferFunction2D(table, ends, heights, **layout)
 
 
