@@ -14,7 +14,7 @@ import volref as vr
 from tests.oracles.layered import faceted_truth, slab
 from tests.oracles.moller_trumbore import first_hits
 from tests.scenes import rough_scene
-from volref.phantoms.meshes import sphere_mesh
+from volref.phantoms.meshes import box_mesh, sphere_mesh
 from volref.records import Layers
 from volref.stages.rays import pixel_rays
 from volref.truth.canvas import Canvas
@@ -265,6 +265,34 @@ def test_what_arrives_of_the_slabs_tolerances_is_the_tolerance():
     assert max(worst) <= 1e-6
     assert min(shares) >= 0.99e-6 / 6 * (1 - 1e-15)
     assert shares[-1] > 2 * shares[0]
+
+
+@pytest.mark.parametrize("camera", [OUTSIDE, PARALLEL], ids=["perspective", "parallel"])
+def test_clipping_planes_cut_volume_and_meshes_where_they_leave_a_smaller_box(camera):
+    """A glass box in a homogeneous one, both cut: they look like smaller boxes, caps and all."""
+    planes = [vr.Plane((2.0, 0, 0), (1, 0, 0)), vr.Plane((0, 3.5, 0), (0, -1, 0))]
+    low, high = np.array([1.0, 1.0, 1.0]), np.array([5.0, 4.5, 3.0])
+    glass = box_mesh(high - low, (low + high) / 2, colors=(0.2, 0.5, 0.9))
+    glass = dataclasses.replace(glass, opacity=0.4)
+    cut = box_scene([glass], camera)
+    # A plan says nothing of clipping planes.
+    cut, plan = dataclasses.replace(cut, clip=planes), vr.plan(cut, method="exact", tolerance=1e-12)
+    out = vr.render(cut, plan=plan, method="exact", tolerance=1e-12)
+    low[0], high[1] = 2.0, 3.5
+    smaller = box_mesh(high - low, (low + high) / 2)
+    triangles = smaller.vertices[smaller.faces]
+    pixels = np.arange(WIDTH * HEIGHT)
+    clear = first_hits(camera, WIDTH, HEIGHT, triangles, pixels).margin > 2.0**-16
+    assert clear.sum() >= len(pixels) - 2
+    rays = pixel_rays(camera, WIDTH, HEIGHT, pixels[clear])
+    box = (2.0, -0.5, -0.5), (6.5, 3.5, 4.5)
+    look = [((0.2, 0.5, 0.9), 0.4)] * len(triangles)
+    expected = [
+        faceted_truth(ray, triangles, look, box, (COLOR, EXTINCTION), BACKGROUND)
+        for ray in zip(rays.origins, rays.directions, strict=True)
+    ]
+    # Distances of 20, off by some ulp over a cosine of 1 : 10.
+    np.testing.assert_allclose(out.rgba.reshape(-1, 4)[clear], expected, rtol=0, atol=1e-13)
 
 
 def test_a_canvas_has_layers_only_of_transparent_meshes():
