@@ -160,6 +160,14 @@ def test_a_beam_that_looks_down_has_its_lowest_point_in_the_box():
     assert high[1] >= y.max()
 
 
+@pytest.mark.parametrize("beam", ["straight", "4/3-earth"])
+def test_between_a_sweep_that_looks_down_and_one_that_looks_up_the_horizon_is_in_the_box(beam):
+    radar = RadarVolume([sweep(e, np.ones((3, 1000)), spacing=300.0) for e in (-30, 40)], beam=beam)
+    ranges = np.full(71, radar.sweeps[0].last_range)
+    _, y, _ = world_of_beam(ranges, np.zeros(71), np.linspace(-30, 40, 71), beam)
+    assert y.max() <= radar.box[1][1] < y.max() + 10.0
+
+
 def test_random_radars_have_what_they_were_made_of():
     radar = uneven(3)
     assert len(radar.sweeps) == 4

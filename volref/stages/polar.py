@@ -204,7 +204,6 @@ def _values_at(table: RadarTable, slant: Floats, azimuth: Floats, elevation: Flo
     # Above the highest sweep there is no other: the point is seen only if it lies on that one.
     below |= (low == high) & (elevation > tilt + ON)
     share[(np.abs(elevation - tilt) <= ON) | (low == high)] = 0.0
-    share[np.abs(elevation - upper_tilt) <= ON] = 1.0
     values = np.clip(_between(values, upper, share), *table.bounds)
     values[below] = np.nan
     return values
