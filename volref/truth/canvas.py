@@ -11,6 +11,7 @@ from volref.records import Layers, Surface
 from volref.scene.lights import Material
 from volref.scene.scene import Scene
 from volref.stages.lighting import brightest_lit
+from volref.truth.integration import Integrated, Integration
 from volref.truth.layered import integrate_layered
 from volref.truth.layers import visible_layers
 from volref.truth.parts import Parts, runs
@@ -44,6 +45,11 @@ class Canvas:
         """Return the layers of some pixels, None if the scene has none."""
         return None if self.layers is None else self.layers.of_pixels(pixels)
 
+    def integrated(self, integration: Integration | None, pixels: Indices, tolerance: float) -> Integrated:
+        """Return what the scene shows at some pixels, all layers laid over each other; None: no volume."""
+        layers, distance = self.layers_of(pixels), self.distance[pixels]
+        return integrate_layered(integration, layers, pixels, distance, self.behind(pixels), tolerance)
+
     def all_behind(self) -> Floats:
         """Return what lies behind the volume at every pixel, (H W, 4), read-only."""
         pixels = len(self.bound)
@@ -59,8 +65,7 @@ class Canvas:
             return
         parts = runs(len(self.bound), PIXELS_AT_ONCE)
         for pixels in map(parts.pixels, range(parts.count)):
-            layers, distance = self.layers_of(pixels), self.distance[pixels]
-            shown = integrate_layered(None, layers, pixels, distance, self.behind(pixels), 0.0)
+            shown = self.integrated(None, pixels, 0.0)
             self.rgba[pixels], self.bound[pixels] = shown.rgba, shown.bound
 
     def show_anything(self, parts: Parts) -> None:

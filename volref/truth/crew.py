@@ -21,7 +21,6 @@ from volref.scene.footprint import Rectangle
 from volref.truth.canvas import Canvas
 from volref.truth.errands import errand_of, forget, run_errand
 from volref.truth.integration import Integrated, Integration
-from volref.truth.layered import integrate_layered
 from volref.truth.parts import Parts, runs_in
 from volref.truth.workers import results
 
@@ -102,9 +101,7 @@ class Crew:
         def integrate(task: range) -> Integrated | None:
             if time.perf_counter() > self.deadline:
                 return None
-            pixels = _joined(parts, task)
-            layers, distance = canvas.layers_of(pixels), canvas.distance[pixels]
-            return integrate_layered(integration, layers, pixels, distance, canvas.behind(pixels), tolerance)
+            return canvas.integrated(integration, _joined(parts, task), tolerance)
 
         items = ((task,) for task in tasks)
         if self._executor is not None:
