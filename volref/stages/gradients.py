@@ -2,8 +2,8 @@
 
 n points; gradients are (3, n), x first, in value units per index or per world unit.
 
-The 3 x 3 x 3 operators are correlations with weights on the 27 samples around.  Sobel's x component (Sobel and
-Feldman 1968, in three dimensions) is the central difference along x, smoothed by 1 2 1 along y and z:
+The 3 x 3 x 3 operators are correlations with weights on the 27 samples around.  Sobel's x component (Sobel
+and Feldman 1968, in three dimensions) is the central difference along x, smoothed by 1 2 1 along y and z:
 
     slice x - 1        slice x        slice x + 1
     -1 -2 -1           0  0  0         1  2  1
@@ -52,8 +52,8 @@ def sobel_kernels() -> Floats:
 def cej_kernels() -> Floats:
     """Return the weights with which Cej 2020 computes MINUS the gradient, its misprint included.
 
-    Sobel's weights without their normalisation, divided by 27.  In the z component one weight of the far slice
-    is -2 in place of -1, so that a constant field c has the gradient -c / 27 along z.
+    Sobel's weights without their normalisation, divided by 27.  In the z component one weight of the far
+    slice is -2 in place of -1, so that a constant field c has the gradient -c / 27 along z.
     """
     kernels = sobel_kernels() * (-32.0 / 27.0)
     kernels[2, 2, 2, 2] = -2.0 / 27.0

@@ -74,7 +74,7 @@ def choose(scene: Scene, plan: Plan, prepared: Prepared, distance: Floats, behin
 
     distance (H W,) and behind (H W, 4) are those of all pixels.
     """
-    tiles = _tiles(scene)
+    tiles = tiles_to_try(scene)
     if len(tiles) == 0:
         return None
     pixels = tiles.ravel()
@@ -131,7 +131,7 @@ def around_each(estimate: Floats) -> Floats:
     return np.asarray(maximum_filter(estimate, size, mode="nearest"))
 
 
-def _tiles(scene: Scene) -> Indices:
+def tiles_to_try(scene: Scene) -> Indices:
     """Return the pixels (k, SIDE, SIDE) of tiles spread over the image."""
     across, down = scene.width // SIDE, scene.height // SIDE
     count = min(TILES, int(across * down * MOST_SHARE))

@@ -15,6 +15,7 @@ from volref.scene.scene import Scene
 from volref.truth.canvas import Canvas
 from volref.truth.choosing import Choice, around_each, choose
 from volref.truth.crew import Crew, Progress, available_cores
+from volref.truth.estimating import march_to_tolerance
 from volref.truth.integration import Integration
 from volref.truth.parts import TILE_HEIGHT, TILE_WIDTH, cut, tiles
 from volref.truth.result import Render
@@ -107,6 +108,8 @@ def _draw(scene: Scene, plan: Plan, canvas: Canvas, crew: Crew) -> tuple[str, Pl
     if plan.method == "march":
         crew.draw(canvas, Integration(scene, plan), crew.runs(where, scene.width, RAYS_PER_CHUNK))
         return "estimate", plan
+    if planning.sampled_because(scene):
+        return "estimate", march_to_tolerance(scene, plan, canvas, crew, where)
     integration = Integration(scene, plan)
     if plan.method == "auto":
         around = canvas.distance, canvas.all_behind()
