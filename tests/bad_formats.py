@@ -154,6 +154,12 @@ def hdf5_of(write):
     return build
 
 
+def hdf5_bomb(archive):
+    """Write a dataset whose chunk of 240 bytes unpacks to 10^7."""
+    dataset = archive.create_dataset("f", F.shape, F.dtype, chunks=F.shape, compression="gzip")
+    dataset.id.write_direct_chunk((0, 0, 0), zlib.compress(b"\0" * 10**7))
+
+
 def dataset_of(values=F, **how):
     return hdf5_of(lambda archive: archive.create_dataset("f", data=values, **how))
 
@@ -443,6 +449,7 @@ HDF5 = [
 ]
 
 ONES = {"spacing": (1, 1, 1)}
+HDF5.append(BadFile("HDF5 gzip bomb", hdf5_of(hdf5_bomb), "volume", ("unpack to at most", "a chunk"), ONES))
 ZARR = [
     BadFile("Zarr without spacing", zarr_of(), "volume", ("spacing", "got none", "a.zarr.json")),
     BadFile("Zarr of an image", zarr_of(F[0]), "volume", ("3 axes", "(6, 5)")),
@@ -506,7 +513,14 @@ ZARR = [
         ("2147483648", "c/0/0/0"),
         ONES,
     ),
-    BadFile("Zarr that runs code", old_zarr_with(filters=[{"id": "pickle"}]), "volume", ("pickle",), ONES),
+    BadFile("Zarr that runs code", old_zarr_with(compressor={"id": "pickle"}), "volume", ("pickle",), ONES),
+    BadFile(
+        "Zarr of a codec that makes numbers",
+        old_zarr_with(filters=[{"id": "fixedscaleoffset", "offset": 1, "scale": 2, "dtype": "<i2"}]),
+        "volume",
+        ("packed by", "got fixedscaleoffset"),
+        ONES,
+    ),
     BadFile("Zarr of objects", old_zarr_with(dtype="|O"), "volume", ("a.zarr",), ONES),
     BadFile("Zarr with a link", linked_zarr, "volume", ("the link 0", "copy it"), ONES),
     BadFile("Zarr with damaged JSON", zarr_with(lambda said: said.clear()), "volume", ("a.zarr",), ONES),
@@ -535,6 +549,7 @@ ZARR = [
     BadFile("damaged .zarr.zip", file_of("a.zarr.zip", b"PK\3\4xxxx"), "volume", ("readable Zarr",)),
 ]
 
+HALF = {"width": 5, "height": 6, "depth": 2}
 BVP = [
     BadFile("not a BVP", file_of("a.bvp", b"hello"), "volume", ("a.bvp", "readable BVP")),
     BadFile(
@@ -564,6 +579,16 @@ BVP = [
     BadFile("BVP type", bvp_of(type=33635), "volume", ("33635",)),
     BadFile(
         "BVP block outside", bvp_of(placement={"position": {"x": 1, "y": 0, "z": 0}}), "volume", ("inside",)
+    ),
+    BadFile(
+        "BVP blocks on each other",
+        bvp_of(
+            block={"dimensions": HALF},
+            members={"b": F[:2].tobytes()},
+            placements=[{"index": 0, "position": {"x": 0, "y": 0, "z": 0}}] * 2,
+        ),
+        "volume",
+        ("each of its 120 voxels", "120 voxels that leave 60 out"),
     ),
     BadFile("BVP block missing", bvp_of(placements=[]), "volume", ("each of its 120 voxels", "120 out")),
     BadFile("BVP compressed", bvp_of(block={"format": "lz4"}), "volume", ("raw blocks", "'lz4'")),
