@@ -1,13 +1,16 @@
 """`render_jittered`: marches with start offsets, and their mean over frames.
 
 N frames, u the offset of a ray in a frame: the sample of every segment lies u of its length behind where it
-begins.  The mean over u of such a rule is the integral along the ray, so the mean of the optical depths of
-frames goes to the true one; that of images is off by a little more, since exp bends:
+begins.  The mean over u of such a rule is the integral of the extinction along the ray, so the mean of the
+optical depths of frames goes to the true one.  That of images does not quite:
 
-    mean of exp(-tau - e) = exp(-tau) (1 + var(e) / 2 + ...)
+- exp bends: mean of exp(-tau - e) = exp(-tau) (1 + var(e) / 2 + ...).  Frames that differ by the standard
+  deviation s have s = T sd(e) to leading order, T = exp(-tau), so this is s^2 / (2 T);
+- a segment has one colour, while the light that reaches the eye from it is more from its front than from its
+  back: with c' the slope of the colour, sigma c' h^2 / 12 per segment of length h.
 
-Frames that differ by the standard deviation s have s = exp(-tau) sd(e) to leading order, so this is
-s^2 / (2 T) with T = exp(-tau); no number of frames takes it away, only a smaller step does.
+Both are of second order in the step, and no number of frames takes them away.  The second is of the size of
+the midpoint rule's own error, so what that rule says of itself, at a pixel or beside it, stands in for it.
 """
 
 import dataclasses
@@ -22,6 +25,7 @@ from volref.errors import SceneError
 from volref.planning import HALF_LEVEL, Plan, Stage
 from volref.scene.scene import Scene
 from volref.stages.jitter import jitter_images, repeated
+from volref.truth.choosing import around_each
 from volref.truth.crew import Progress
 from volref.truth.rendering import decide, render
 from volref.truth.result import Render
@@ -31,7 +35,7 @@ MOST_FRAMES = 100_000
 # The share of pixels whose error an estimate should cover.
 COVERED = 0.999
 
-# Fewer frames are compared with the midpoint rule too: what few of them hit may have been hit by none.
+# Fewer frames are compared with the midpoint rule: what few of them hit may have been hit by none.
 ENOUGH = 16
 
 # Steps in which the progress of a frame is told.
@@ -54,9 +58,9 @@ def render_jittered(
     """Return the mean of marches whose samples begin at other places in every pixel and frame.
 
     The bound is an estimate: Student's t for 99.9 % times the standard error of the mean over frames, plus
-    what the mean of exponentials is off by (the head of `volref.truth.jittered`), plus rounding.  Of fewer
-    than 16 frames it is at least how far they are from the midpoint rule, plus what that rule says of itself;
-    of one frame it is that.  A feature that no frame has hit escapes it.
+    what no number of frames takes away (the head of `volref.truth.jittered`), for which one march by the
+    midpoint rule is made beside them.  Of fewer than 16 frames it is at least how far they are from that
+    march, plus what it says of itself; of one frame it is that.  A feature that none has hit escapes it.
 
     Parameters
     ----------
@@ -80,7 +84,7 @@ def render_jittered(
         raise SceneError(message + "make it with volref.plan(scene, method='march')")
     given = None if jitter is None else _checked_jitter(jitter)
     count = _frames(frames, given)
-    runs = count + (count < ENOUGH)
+    runs = count + 1
 
     def march(offsets: Floats | None, number: int) -> Render:
         show = None if progress is None else _part_of(progress, number, runs)
@@ -97,11 +101,12 @@ def render_jittered(
         mean += change / (number + 1)
         spread += change * (out.rgba - mean)
         samples += out.samples
-    bound = _estimate(decided, mean, spread, count) if count > 1 else np.zeros(mean.shape[:2])
+    middle = march(None, count)
+    samples += middle.samples
+    bound = around_each(middle.bound) + (_noise(mean, spread, count) if count > 1 else 0.0)
     if count < ENOUGH:
-        middle = march(None, count)
-        samples += middle.samples
-        bound = np.maximum(bound, np.abs(mean - middle.rgba).max(axis=-1) + middle.bound)
+        apart = around_each(np.abs(mean - middle.rgba).max(axis=-1))
+        bound = np.maximum(bound, apart + middle.bound)
     reason = f"the mean of {count} frame{'s' * (count > 1)} with start offsets "
     reason += f"from seed {seed}" if given is None else "as given"
     stage = Stage("jitter", included=True, reason=reason)
@@ -116,10 +121,10 @@ def render_jittered(
     )
 
 
-def _estimate(plan: Plan, mean: Floats, spread: Floats, count: int) -> Floats:
-    """Return what the mean (H, W, 4) of frames may be off by, of the sum of their squared deviations.
+def _noise(mean: Floats, spread: Floats, count: int) -> Floats:
+    """Return what chance leaves in the mean (H, W, 4) of frames, of the sum of their squared deviations.
 
-    The bend is taken twice, for what its leading term leaves out.
+    The bend of the exponential is taken twice, for what its leading term leaves out.
     """
     from scipy.special import stdtrit
 
@@ -127,11 +132,7 @@ def _estimate(plan: Plan, mean: Floats, spread: Floats, count: int) -> Floats:
     sure = float(stdtrit(count - 1, (1 + COVERED) / 2)) / np.sqrt(count)
     clear = 1.0 - mean[..., 3]
     bend = np.divide(deviation**2, clear, out=deviation.copy(), where=clear > deviation)
-    # What all frames have in common: rounding, and rays that ended early.
-    common = plan.rounding + float(np.finfo(plan.precision).eps) * plan.most_segments
-    cut = np.where(clear - bend < plan.termination, plan.termination, 0.0)
-    brightest = max(float(mean.max()), 1.0)
-    return np.asarray(sure * deviation + bend + (common + cut + count * 2.0**-52) * brightest)
+    return np.asarray(sure * deviation + bend + count * 2.0**-52 * mean.max(axis=-1))
 
 
 def _offsets(scene: Scene, given: Floats | None, seed: int, number: int) -> Floats:
