@@ -15,7 +15,6 @@ Cells that cannot be seen are dropped before their cubic is made.
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TypeAlias
 
 import numpy as np
 
@@ -36,10 +35,6 @@ SPLITTER = 2.0**27 + 1
 PARALLEL = 2.0**-60
 
 
-# Tells of cells, by their rays (n,) and padded indices along x, y and z, whether they matter (n,).
-Wanted: TypeAlias = Callable[[Indices, list[Numbers]], Booleans]
-
-
 @dataclass(frozen=True, eq=False)
 class CellGrid:
     """A padded grid as cells, and which of them can be seen.
@@ -51,9 +46,9 @@ class CellGrid:
     """
 
     samples: Callable[[list[Numbers]], list[Floats]]
-    seen: Booleans
+    seen: Numbers
     shift: int
-    near: Booleans
+    near: Numbers
     near_shift: int
     steepest: float
 
@@ -78,14 +73,13 @@ def placed_cells(
     spans: Spans,
     *,
     precise: bool,
-    wanted: Wanted | None = None,
+    beaten: Floats | None = None,
 ) -> tuple[Pieces, Floats]:
     """Return the pieces as `cells_along` does, and t in the middle of each (n,).
 
-    `wanted` tells of cells, by their ray and their padded indices along x, y and z, whether their pieces are
-    to be made; without it those are whose block can be seen.
+    With `beaten` (R,) those count as seen whose number in `seen` and `near` is greater than their ray's.
     """
-    rays, t_near, t_far = _near_part(grid, origins, directions, spans)
+    rays, t_near, t_far = _near_part(grid, origins, directions, spans, beaten)
     if len(rays) == 0:
         nothing = np.empty(0)
         return Pieces(rays, nothing, np.empty((4, 0)), nothing, nothing, rays, nothing), nothing
@@ -95,10 +89,10 @@ def placed_cells(
     direction = [d.take(ray) for d in directions]
     positions = [d * middle + o.take(ray) for o, d in zip(origins, direction, strict=True)]
     wholes = [position.astype(np.int32) for position in positions]
-    if wanted is None:
-        chosen = np.flatnonzero(of_blocks(grid.seen, wholes, grid.shift))
-    else:
-        chosen = np.flatnonzero(wanted(rays.take(ray), wholes))
+    seen = _of_blocks(grid.seen, wholes, grid.shift)
+    if beaten is not None:
+        seen = seen > beaten.take(rays).take(ray)
+    chosen = np.flatnonzero(seen)
     ray, length = ray.take(chosen), length.take(chosen)
     wholes = [whole.take(chosen) for whole in wholes]
     fractions = [position.take(chosen) - whole for position, whole in zip(positions, wholes, strict=True)]
@@ -152,6 +146,37 @@ def recentred(
     return moved, rest, Spans(t_near - middle, t_far - middle)
 
 
+def sharp_values(
+    grid: CellGrid, rays: tuple[Floats, Floats, Floats], t: Floats, error: Floats, at_end: Booleans
+) -> Floats:
+    """Return the values (n,) at t (n,) of rays (origins, rests and directions, (3, n) each) to some ulp.
+
+    Positions o + t d are kept to twice the digits.  Where a piece ends, `at_end` (n,), t is corrected for the
+    plane of whole or half indices that lies nearest, if that is within `error` (n,).
+    """
+    origins, rests, directions = rays
+    product = directions * t
+    place, lost = _two_sum(origins, product)
+    lost += rests + _product_error(directions, np.broadcast_to(t, product.shape), product)
+    plane = 0.5 * np.rint(2 * place)
+    beyond = np.where(directions == 0, np.inf, (place - plane) + lost)
+    axis = np.abs(beyond).argmin(axis=0)[None]
+    by = np.take_along_axis(beyond, axis, axis=0)[0]
+    snap = at_end & (np.abs(by) <= error)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        shift = np.where(snap, -by / np.take_along_axis(directions, axis, axis=0)[0], 0.0)
+    lost += directions * shift
+    whole = np.floor(place)
+    fraction = (place - whole) + lost
+    exact = np.take_along_axis(plane - whole, axis, axis=0)[0]
+    kept = np.take_along_axis(fraction, axis, axis=0)[0]
+    np.put_along_axis(fraction, axis, np.where(snap, exact, kept)[None], axis=0)
+    values = grid.samples([w.astype(np.int32) for w in whole])
+    for f in fraction:
+        values = [(1 - f) * a + f * b for a, b in zip(values[::2], values[1::2], strict=True)]
+    return values[0]
+
+
 def _two_sum(a: Floats, b: Floats) -> tuple[Floats, Floats]:
     """Return a + b rounded, and what rounding took off it, exactly."""
     total = a + b
@@ -169,7 +194,7 @@ def _product_error(a: Floats, b: Floats, product: Floats) -> Floats:
 
 
 def _near_part(
-    grid: CellGrid, origins: Floats, directions: Floats, spans: Spans
+    grid: CellGrid, origins: Floats, directions: Floats, spans: Spans, beaten: Floats | None = None
 ) -> tuple[Indices, Floats, Floats]:
     """Return the rays that come near anything seen, and the part of each that does: from t to t.
 
@@ -193,6 +218,8 @@ def _near_part(
         index *= blocks
         index += place.astype(np.int32)
     near = grid.near.reshape(-1).take(index, mode="clip")
+    if beaten is not None:
+        near = near > beaten[:, None]
     near &= number < count[:, None]
     rays = np.flatnonzero(near.any(axis=1))
     near = near[rays]
@@ -231,7 +258,7 @@ def _between_planes(
     return ray, length, edges.reshape(-1).take(flat) + 0.5 * length
 
 
-def of_blocks(values: Numbers, wholes: list[Numbers], shift: int) -> Numbers:
+def _of_blocks(values: Numbers, wholes: list[Numbers], shift: int) -> Numbers:
     """Return the value (n,) of the block of each cell, of `values` laid out as `CellGrid.seen`."""
     index = np.zeros(len(wholes[0]), np.int32)
     for axis, blocks in zip((2, 1, 0), values.shape, strict=True):

@@ -41,40 +41,60 @@ class Estimates:
         return Estimates(*(np.clip(x, low, high) for x in (self.value, self.least, self.most)))
 
 
-def greatest_of(cubic: Floats) -> Floats:
-    """Return the greatest value (n,) of cubics (4, n) on their pieces.
+def greatest_of(cubic: Floats) -> tuple[Floats, Floats]:
+    """Return the greatest value (n,) of cubics (4, n) on their pieces, and the v (n,) where it is.
 
     Examples
     --------
     v - v^2 is greatest at its far end, v - 4 v^2 at 1/8:
 
-    >>> greatest_of(np.array([[0.0, 0.0], [1.0, 1.0], [-1.0, -4.0], [0.0, 0.0]])).tolist()
-    [0.25, 0.0625]
+    >>> most, v = greatest_of(np.array([[0.0, 0.0], [1.0, 1.0], [-1.0, -4.0], [0.0, 0.0]]))
+    >>> most.tolist(), v.tolist()
+    ([0.25, 0.0625], [0.5, 0.125])
     """
-    half = np.full(cubic.shape[1], 0.5)
-    most = np.maximum(evaluate(cubic, -half), evaluate(cubic, half))
-    for v in critical_points(cubic):
-        np.maximum(most, evaluate(cubic, v), out=most)
-    return most
+    at = np.full(cubic.shape[1], -0.5)
+    most = evaluate(cubic, at)
+    for v in (np.full(cubic.shape[1], 0.5), *critical_points(cubic)):
+        value = evaluate(cubic, v)
+        at = np.where(value > most, v, at)
+        np.maximum(most, value, out=most)
+    return most, at
 
 
-def greatest_along(pieces: Pieces, off: Floats, known: Floats) -> Estimates:
-    """Return the greatest value along rays of which values `known` (R,), off by `off` at most, are on them.
+def greatest_along(pieces: Pieces, here: Floats, sharp: Floats, off: Floats, known: Floats) -> Estimates:
+    """Return the greatest value along rays, of pieces whose cubics are greatest at `here` (n,).
 
-    Pieces that cannot exceed those may be missing.
+    sharp (n,): the same with less rounding.  Some values `known` (R,), off by `off` at most, are on the rays;
+    pieces that cannot exceed those may be missing, and they stand for a ray without any.
 
     Where a ray surely is in the cell but for the share `astray` of its piece, its greatest value is at least
     that of the cubic less what the cubic can change there; else less `off`.
     """
     ray, cubic = pieces.ray, pieces.cubic
+    slack = slack_of_extremes(pieces)
     change = np.abs(cubic[1]) + np.abs(cubic[2]) + 0.75 * np.abs(cubic[3])
-    slack = pieces.slack + ROUNDOFF * (EVALUATION * change + np.where(change > 0, 2 * np.abs(cubic[0]), 0.0))
     edge = np.where(pieces.astray < 1, np.minimum(pieces.astray * change, off.take(ray)), off.take(ray))
-    here = greatest_of(cubic)
     value, least, most = known.copy(), known - off, known.copy()
-    for result, found in ((value, here), (least, here - slack - edge), (most, here + slack)):
+    value[ray] = -np.inf
+    for result, found in ((value, sharp), (least, here - slack - edge), (most, here + slack)):
         _raise_each(result, ray, found)
     return Estimates(value, least, most + off)
+
+
+def slack_of_extremes(pieces: Pieces) -> Floats:
+    """Return how far the greatest values of pieces' cubics may be off (n,): slack, and evaluation."""
+    change = np.abs(pieces.cubic[1:]).sum(axis=0)
+    size = EVALUATION * change + np.where(change > 0, 2 * np.abs(pieces.cubic[0]), 0.0)
+    return np.asarray(pieces.slack + ROUNDOFF * size)
+
+
+def near_greatest(pieces: Pieces, here: Floats, off: Floats) -> Indices:
+    """Return the pieces that change at all, and whose greatest values `here` (n,) may be their ray's."""
+    slack = slack_of_extremes(pieces) + off.take(pieces.ray)
+    least = np.full(len(off), -np.inf)
+    _raise_each(least, pieces.ray, here - slack)
+    changes = pieces.cubic[1:].any(axis=0)
+    return np.flatnonzero(changes & (here + slack >= least.take(pieces.ray)))
 
 
 def _raise_each(most: Floats, ray: Indices, values: Floats) -> None:

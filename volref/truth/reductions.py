@@ -16,16 +16,16 @@ from functools import partial
 import numpy as np
 
 from volref.arrays import Booleans, Floats, Indices, Numbers
-from volref.records import Spans
+from volref.records import Pieces, Spans
 from volref.scene.blocks import block_ranges, flag_blocks
 from volref.scene.scene import Scene
 from volref.scene.transfer import TransferFunction
 from volref.scene.transform import transform_directions, transform_points
 from volref.scene.volume import Volume
-from volref.stages.cells import CellGrid, of_blocks, placed_cells, position_error
+from volref.stages.cells import CellGrid, placed_cells, position_error, sharp_values
 from volref.stages.isosurface import first_crossing
 from volref.stages.rays import pixel_rays
-from volref.stages.reductions import Estimates, greatest_along, mean_along
+from volref.stages.reductions import Estimates, greatest_along, greatest_of, mean_along, near_greatest
 from volref.stages.sampling import PAD, Grid, cell_corners, grid_of, trilinear
 from volref.stages.spans import box_spans, cut_spans
 from volref.stages.unit_layers import straight_colors, unit_layers
@@ -41,6 +41,9 @@ PRECISE = 1e-8
 # Voxels up to which blocks have 2, and 4, cells a side; beyond, 8.
 FINE, MEDIUM = 1 << 23, 1 << 27
 
+# Crossings of rays with planes of the grid that are worked on together, so that their arrays fit the cache.
+CROSSINGS = 1 << 15
+
 # Indices between the samples of a ray that say what a cell has to beat.
 SAMPLES_APART = 2.0
 
@@ -52,13 +55,12 @@ MARGIN = 1e-9
 class Reducible:
     """A volume made ready for the mode of its scene.
 
-    best: the greatest value of each block, of the negative field for "minip", laid out as `grid.seen`; only
-    for modes that need it.  values: the least and greatest value of the volume.
+    For "mip" and "minip" the grid's blocks hold their greatest value, of the negative field for "minip".
+    values: the least and greatest value of the volume.
     """
 
     samples: Grid
     grid: CellGrid
-    best: Floats | None
     index_from_world: Floats
     low: Floats
     high: Floats
@@ -84,6 +86,7 @@ class Reduced:
 class _Ways:
     """Rays in padded index space about the middles of their spans, `middle` (R,) from where they start.
 
+    error (R,): how far positions may be off, in indices.
     off (R,): how far values may be off where rounding puts a ray into the next cell, or misplaces its ends.
     touching, doubtful (R,): whether rounding decides that the span is empty, or that it is not.
     """
@@ -94,9 +97,25 @@ class _Ways:
     spans: Spans
     ends: Spans
     middle: Floats
+    error: Floats
     off: Floats
     touching: Booleans
     doubtful: Booleans
+
+    def part(self, chosen: Indices) -> "_Ways":
+        """Return the rays at the indices `chosen`."""
+        return _Ways(
+            self.origins[:, chosen],
+            self.rests[:, chosen],
+            self.directions[:, chosen],
+            Spans(self.spans.t_near[chosen], self.spans.t_far[chosen]),
+            Spans(self.ends.t_near[chosen], self.ends.t_far[chosen]),
+            self.middle[chosen],
+            self.error[chosen],
+            self.off[chosen],
+            self.touching[chosen],
+            self.doubtful[chosen],
+        )
 
 
 def prepare_reduction(scene: Scene) -> Reducible:
@@ -105,21 +124,30 @@ def prepare_reduction(scene: Scene) -> Reducible:
     assert isinstance(volume, Volume)
     samples = grid_of(volume)
     shift = 1 if volume.values.size <= FINE else 2 if volume.values.size <= MEDIUM else 3
-    best = None
-    seen = near = np.ones([-(-n // (1 << shift)) + 2 for n in volume.values.shape], np.bool_)
-    near_shift = shift
+    near_shift = shift + 1
+    seen: Numbers
+    near: Numbers
     if scene.mode in ("mip", "minip"):
-        low, high = block_ranges(volume, 1 << shift, (0, 0, 0))
-        best = np.pad(high if scene.mode == "mip" else -low, 1, mode="edge")
+        seen = _greatest(volume, scene.mode, shift, 0)
+        near = _greatest(volume, scene.mode, near_shift, 1 << shift)
     elif scene.mode == "isosurface":
-        near_shift = shift + 1
         assert scene.isovalue is not None
         seen = _held(volume, scene.isovalue, shift, 0)
         near = _held(volume, scene.isovalue, near_shift, 1 << shift)
+    else:
+        seen, near = (
+            np.ones([-(-n >> k) + 2 for n in volume.values.shape], np.bool_) for k in (shift, near_shift)
+        )
     least, most = volume.value_bounds
     grid = CellGrid(partial(cell_corners, samples), seen, shift, near, near_shift, most - least)
     low, high = volume.index_bounds
-    return Reducible(samples, grid, best, volume.index_from_world, low, high, volume.value_bounds)
+    return Reducible(samples, grid, volume.index_from_world, low, high, volume.value_bounds)
+
+
+def _greatest(volume: Volume, mode: str, shift: int, reach: int) -> Numbers:
+    """Return the greatest value of each block, of the negative field for "minip"."""
+    low, high = block_ranges(volume, 1 << shift, (reach, reach, reach))
+    return np.asarray(np.pad(high if mode == "mip" else -low, 1, mode="edge"))
 
 
 def _held(volume: Volume, isovalue: float, shift: int, reach: int) -> Booleans:
@@ -147,25 +175,43 @@ def reduce_pixels(
     tolerance: float,
 ) -> Reduced:
     """Reduce the rays of `pixels` (R,) from `begin` (R,) to `distance` (R,) over `behind` (R, 4)."""
-    transfer = scene.transfer
-    assert isinstance(transfer, TransferFunction)
     rays = pixel_rays(scene.camera, scene.width, scene.height, pixels)
-    nowhere = np.full(len(pixels), np.inf)
     if scene.mode == "slice":
         place = prepared.index_from_world, prepared.low, prepared.high
         rgba, bound = slice_pixels(scene, prepared.samples, place, rays, begin, distance, behind)
-        return Reduced(rgba, bound, nowhere, np.zeros(len(pixels)), len(pixels))
+        return Reduced(rgba, bound, np.full(len(bound), np.inf), np.zeros(len(bound)), len(bound))
     origins = transform_points(prepared.index_from_world, rays.origins).T
     directions = transform_directions(prepared.index_from_world, rays.directions).T
     ways = _ways(prepared, origins, directions, begin, distance)
+    crossings = ((ways.spans.t_far - ways.spans.t_near) * np.abs(directions).sum(axis=0)).sum()
+    count = int(min(1 + crossings // CROSSINGS, max(len(pixels), 1)))
+    parts = np.array_split(np.arange(len(pixels)), count)
+    return _joined([_reduce(scene, prepared, ways.part(part), behind[part], tolerance) for part in parts])
+
+
+def _joined(parts: list[Reduced]) -> Reduced:
+    if len(parts) == 1:
+        return parts[0]
+    return Reduced(
+        np.concatenate([part.rgba for part in parts]),
+        np.concatenate([part.bound for part in parts]),
+        np.concatenate([part.hit for part in parts]),
+        np.concatenate([part.off for part in parts]),
+        sum(part.pieces for part in parts),
+    )
+
+
+def _reduce(scene: Scene, prepared: Reducible, ways: _Ways, behind: Floats, tolerance: float) -> Reduced:
+    """Reduce rays (R,) over `behind` (R, 4)."""
+    assert isinstance(scene.transfer, TransferFunction)
     if scene.mode == "isosurface":
         return _isosurface(scene, prepared, ways, behind)
     if scene.mode == "average":
         found, pieces = _mean(prepared, ways, precise=tolerance < PRECISE)
     else:
         found, pieces = _extreme(scene.mode, prepared, ways)
-    rgba, bound = _over(transfer, found.within(*prepared.values), ways, behind)
-    return Reduced(rgba, bound, nowhere, np.zeros(len(pixels)), pieces)
+    rgba, bound = _over(scene.transfer, found.within(*prepared.values), ways, behind)
+    return Reduced(rgba, bound, np.full(len(bound), np.inf), np.zeros(len(bound)), pieces)
 
 
 def _ways(
@@ -196,7 +242,7 @@ def _ways(
     inside &= spans.t_far > spans.t_near
     touching = ~inside & (ends.t_near + ends.t_far > 0)
     doubtful = inside & (spans.t_far - spans.t_near <= ends.t_near + ends.t_far)
-    return _Ways(moved, rests, directions, spans, ends, middle, off, touching, doubtful)
+    return _Ways(moved, rests, directions, spans, ends, middle, error, off, touching, doubtful)
 
 
 def _over(transfer: TransferFunction, found: Estimates, ways: _Ways, behind: Floats) -> tuple[Floats, Floats]:
@@ -211,10 +257,12 @@ def _over(transfer: TransferFunction, found: Estimates, ways: _Ways, behind: Flo
 
 
 def _values_at(prepared: Reducible, ways: _Ways, t: Floats) -> Floats:
-    """Return the values (R,) at t (R,) along rays, held to the box."""
-    low, high = prepared.low[:, None] + PAD, prepared.high[:, None] + PAD
-    position = np.clip(ways.origins + t * ways.directions, low, high)
-    return np.array(trilinear(prepared.samples, position, Workspace()))
+    """Return the values (..., R) at t (..., R) along rays, held to the box."""
+    position = np.empty((3, *t.shape))
+    for axis in range(3):
+        along = ways.origins[axis] + t * ways.directions[axis]
+        np.clip(along, prepared.low[axis] + PAD, prepared.high[axis] + PAD, out=position[axis])
+    return np.array(trilinear(prepared.samples, position.reshape(3, -1), Workspace())).reshape(t.shape)
 
 
 def _extreme(mode: str, prepared: Reducible, ways: _Ways) -> tuple[Estimates, int]:
@@ -225,18 +273,26 @@ def _extreme(mode: str, prepared: Reducible, ways: _Ways) -> tuple[Estimates, in
     sign = 1.0 if mode == "mip" else -1.0
     known = _sampled(sign, prepared, ways)
     off = ways.off + 16 * ROUNDOFF * np.abs(known)
-    assert prepared.best is not None
-    wanted = partial(_may_beat, prepared.best, prepared.grid.shift, known)
-    pieces, _ = placed_cells(
-        prepared.grid, ways.origins, ways.rests, ways.directions, ways.spans, precise=True, wanted=wanted
+    highest = prepared.values[1] if mode == "mip" else -prepared.values[0]
+    beaten = np.where(known < highest, known - off, highest)
+    pieces, middle = placed_cells(
+        prepared.grid, ways.origins, ways.rests, ways.directions, ways.spans, precise=True, beaten=beaten
     )
     pieces.cubic[:] *= sign
-    found = greatest_along(pieces, off, known)
+    here, at = greatest_of(pieces.cubic)
+    sharp = here.copy()
+    close = near_greatest(pieces, here, off)
+    sharp[close] = sign * _sharpened(prepared, ways, pieces.take(close), middle.take(close), at.take(close))
+    found = greatest_along(pieces, here, sharp, off, known)
     return (found if mode == "mip" else found.negative()), len(pieces.ray)
 
 
-def _may_beat(best: Floats, shift: int, known: Floats, ray: Indices, wholes: list[Numbers]) -> Booleans:
-    return np.asarray(of_blocks(best, wholes, shift) > known.take(ray))
+def _sharpened(prepared: Reducible, ways: _Ways, pieces: Pieces, middle: Floats, at: Floats) -> Floats:
+    """Return the values of pieces at v = `at` (n,) with less rounding than their cubics have."""
+    ray = pieces.ray
+    rays = ways.origins[:, ray], ways.rests[:, ray], ways.directions[:, ray]
+    t = middle + at * pieces.length
+    return sharp_values(prepared.grid, rays, t, ways.error.take(ray), np.abs(at) == 0.5)
 
 
 def _sampled(sign: float, prepared: Reducible, ways: _Ways) -> Floats:
@@ -244,11 +300,8 @@ def _sampled(sign: float, prepared: Reducible, ways: _Ways) -> Floats:
     length = ways.spans.t_far - ways.spans.t_near
     fastest = np.abs(ways.directions).max(axis=0)
     count = max(int(np.ceil((length * fastest).max(initial=0.0) / SAMPLES_APART)), 1)
-    known = np.full(len(length), -np.inf)
-    for k in range(count):
-        t = ways.spans.t_near + (k + 0.5) / count * length
-        np.maximum(known, sign * _values_at(prepared, ways, t), out=known)
-    return known
+    share = (np.arange(count) + 0.5)[:, None] / count
+    return np.asarray((sign * _values_at(prepared, ways, ways.spans.t_near + share * length)).max(axis=0))
 
 
 def _mean(prepared: Reducible, ways: _Ways, *, precise: bool) -> tuple[Estimates, int]:
