@@ -25,8 +25,8 @@ from volref.io.nrrd import read_nrrd
 from volref.io.placement import GEOMETRY, SIGNS, joined_places, placement_of_affine
 from volref.io.raw import read_raw
 from volref.io.tiff import read_tiff
-from volref.io.zarr import METADATA as ZARR_METADATA
 from volref.io.zarr import read_zarr
+from volref.io.zarr_guard import METADATA as ZARR_METADATA
 
 Statement: TypeAlias = dict[str, Any]
 Found: TypeAlias = tuple[Numbers, Statement]
