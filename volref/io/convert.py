@@ -18,7 +18,7 @@ from volref.io.npy import write_npy, write_npz
 from volref.io.nrrd import write_nrrd
 from volref.io.raw import write_raw
 from volref.io.readers import ATLAS_KEYS
-from volref.io.scenes import document_of_placement
+from volref.io.scene_parts import document_of_placement
 from volref.io.volumes import load_volume
 from volref.scene.volume import Volume
 

@@ -14,8 +14,9 @@ from volref.io.meshes import SUFFIXES, load_meshes
 from volref.io.npy import npz_headers, read_npy
 from volref.io.png import read_png_header
 from volref.io.readers import is_volume_path
+from volref.io.scene_parts import document_of_placement
 from volref.io.scenes import FORMAT as SCENE_FORMAT
-from volref.io.scenes import document_of_placement, load_scene
+from volref.io.scenes import load_scene
 from volref.io.transfer import FORMAT as TRANSFER_FORMAT
 from volref.io.transfer import load_transfer
 from volref.io.volumes import load_volume

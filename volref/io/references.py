@@ -17,7 +17,7 @@ import numpy as np
 
 from volref.errors import FormatError
 from volref.io.guard import Foreign, one_line
-from volref.io.scenes import document_of_placement
+from volref.io.scene_parts import document_of_placement
 from volref.io.volumes import file_state, origin_of, read_again
 from volref.scene.volume import Volume
 

@@ -14,13 +14,21 @@ from volref.io.documents import FORMAT_VERSION, check_document, check_format, wh
 from volref.io.guard import DEFAULT_MAX_BYTES, one_line, path_inside, read_json
 from volref.io.meshes import load_meshes, save_mesh
 from volref.io.npy import write_npy
-from volref.io.transfer import load_transfer
+from volref.io.radar.door import load_radar, save_radar
+from volref.io.scene_parts import (
+    camera_of_document,
+    document_of_camera,
+    document_of_look,
+    document_of_placement,
+    look_of_document,
+)
+from volref.io.transfer import load_transfer, save_transfer
 from volref.io.transfer_json import document_of_transfer, transfer_of_document
 from volref.io.volumes import load_volume
-from volref.scene.camera import Camera
 from volref.scene.mesh import Mesh
+from volref.scene.radar import RadarVolume
 from volref.scene.scene import Scene
-from volref.scene.transfer2d import AnyTransfer
+from volref.scene.transfer2d import AnyTransfer, TransferFunction2D
 from volref.scene.volume import Volume
 
 FORMAT = "volref-scene"
@@ -56,10 +64,14 @@ def load_scene(path: str | Path, *, allow_outside: bool = False, max_bytes: int 
     meshes: list[Mesh] = []
     for entry in document.get("meshes", []):
         meshes.extend(load_meshes(beside(entry), max_bytes=max_bytes) if "path" in entry else [Mesh(**entry)])
-    volume = None
-    if "volume" in document:
-        statement = {key: value for key, value in document["volume"].items() if key != "path"}
-        volume = load_volume(beside(document["volume"]), max_bytes=max_bytes, **statement)
+    if "volume" in document and "radar" in document:
+        message = f"{file.name} must have a volume or a radar, got both; remove one"
+        raise FormatError(message)
+    volume: Volume | RadarVolume | None = None
+    for key, load in (("volume", load_volume), ("radar", load_radar)):
+        if key in document:
+            statement = {name: value for name, value in document[key].items() if name != "path"}
+            volume = load(beside(document[key]), max_bytes=max_bytes, **statement)
     transfer: AnyTransfer | None = None
     if "transfer" in document:
         entry = document["transfer"]
@@ -76,15 +88,16 @@ def load_scene(path: str | Path, *, allow_outside: bool = False, max_bytes: int 
         document["width"],
         document["height"],
         meshes,
-        background=document.get("background", (0.0, 0.0, 0.0, 0.0)),
+        **look_of_document(document),
     )
 
 
 def save_scene(scene: Scene, path: str | Path, *, overwrite: bool = False) -> None:
     """Write a scene as JSON, its arrays beside it; `load_scene` returns the same numbers, bit for bit.
 
-    For `shot.json` the arrays are `shot.volume.npy`, `shot.mesh_0.npz` and so on.  The JSON is written
-    last, so an interrupted run leaves no scene that names a missing file.
+    For `shot.json` the arrays are `shot.volume.npy`, `shot.mesh_0.npz` and so on, and of a radar and a table
+    of value and gradient `shot.radar.npz` and `shot.transfer.json`.  The JSON is written last, so an
+    interrupted run leaves no scene that names a missing file.
 
     Raises
     ------
@@ -96,8 +109,12 @@ def save_scene(scene: Scene, path: str | Path, *, overwrite: bool = False) -> No
         message = f"{one_line(file.name)} must end in .json, got {file.suffix!r}; rename it"
         raise FormatError(message)
     names = {f"{file.stem}.mesh_{i}.npz": mesh for i, mesh in enumerate(scene.meshes)}
-    volume_name = f"{file.stem}.volume.npy"
-    for name in (file.name, *names, *([volume_name] if scene.volume is not None else [])):
+    radar = isinstance(scene.volume, RadarVolume)
+    volume_name = f"{file.stem}.radar.npz" if radar else f"{file.stem}.volume.npy"
+    table_name = f"{file.stem}.transfer.json"
+    written = [volume_name] if scene.volume is not None else []
+    written += [table_name] if isinstance(scene.transfer, TransferFunction2D) else []
+    for name in (file.name, *names, *written):
         check_free(file.with_name(name), overwrite=overwrite)
     document: dict[str, Any] = {
         "format": FORMAT,
@@ -105,47 +122,20 @@ def save_scene(scene: Scene, path: str | Path, *, overwrite: bool = False) -> No
         "width": scene.width,
         "height": scene.height,
         "camera": document_of_camera(scene.camera),
-        "background": list(scene.background),
     }
-    if scene.volume is not None:
-        volume, transfer = scene.gridded
-        write_npy(file.with_name(volume_name), volume.values, overwrite=overwrite)
-        document["volume"] = {"path": volume_name, **document_of_placement(volume)}
-        document["transfer"] = document_of_transfer(transfer)
+    if isinstance(scene.volume, Volume):
+        write_npy(file.with_name(volume_name), scene.volume.values, overwrite=overwrite)
+        document["volume"] = {"path": volume_name, **document_of_placement(scene.volume)}
+    elif isinstance(scene.volume, RadarVolume):
+        save_radar(scene.volume, file.with_name(volume_name), overwrite=overwrite)
+        document["radar"] = {"path": volume_name, "quantity": scene.volume.quantity}
+    if isinstance(scene.transfer, TransferFunction2D):
+        save_transfer(scene.transfer, file.with_name(table_name), overwrite=overwrite)
+        document["transfer"] = {"path": table_name}
+    elif scene.transfer is not None:
+        document["transfer"] = document_of_transfer(scene.transfer)
     for name, mesh in names.items():
         save_mesh(mesh, file.with_name(name), overwrite=overwrite)
     document["meshes"] = [{"path": name} for name in names]
+    document |= document_of_look(scene)
     write_text(file, json.dumps(document, indent=1, allow_nan=False) + "\n", overwrite=overwrite)
-
-
-def camera_of_document(document: dict[str, Any]) -> Camera:
-    """Return the camera in a checked JSON object."""
-    fields = {key: value for key, value in document.items() if key != "kind"}
-    if document["kind"] == "matrix":
-        return Camera.from_matrices(**fields)
-    if "view_from_world" in fields:
-        return Camera(fields.pop("view_from_world"), document["kind"], **fields)
-    build = Camera.look_at if document["kind"] == "perspective" else Camera.orthographic
-    return build(**fields)
-
-
-def document_of_camera(camera: Camera) -> dict[str, Any]:
-    """Return the JSON object that `camera_of_document` reads."""
-    document: dict[str, Any] = {"kind": camera.kind, "view_from_world": camera.view_from_world.tolist()}
-    if camera.clip_matrix is not None:
-        document["clip_from_view"] = camera.clip_matrix.tolist()
-    else:
-        opening = {"fov_y": camera.fov_y, "height": camera.height}
-        document |= {key: value for key, value in opening.items() if value is not None}
-        document |= {"near": camera.near, "far": camera.far}
-    return document | {"clip_z": camera.clip_z}
-
-
-def document_of_placement(volume: Volume) -> dict[str, Any]:
-    """Return where a volume lies, as JSON: spacing, origin, direction, centering."""
-    return {
-        "spacing": list(volume.spacing),
-        "origin": list(volume.origin),
-        "direction": volume.direction.tolist(),
-        "centering": volume.centering,
-    }

@@ -150,8 +150,6 @@ def plan(
 def _refuse_what_is_not_built(scene: Scene) -> None:
     """Refuse what a scene can say and no integrator does yet: an image without it would be wrong."""
     plain: dict[str, object] = {"mode": "composite"}
-    if scene.meshes:
-        plain["clip"] = ()
     for name, value in plain.items():
         if getattr(scene, name) != value:
             message = f"scene.{name} must be {value!r} in this version, got another; render it without"
