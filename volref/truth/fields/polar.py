@@ -29,8 +29,7 @@ class PolarField(Field):
     def look(self, samples: Samples, work: Workspace) -> tuple[Floats, Floats]:
         """Return the colours (3, n) and the strength (n,), 0 where nothing was measured."""
         values, measured = polar_lookup(self.gates, samples.absolute() - PAD)
-        low = self.table.low if self.table.scale is None else 0.0
-        colors, strength = classify(self.table, np.where(measured, values, low), work)
+        colors, strength = classify(self.table, np.where(measured, values, self.table.low), work)
         strength[~measured] = 0.0
         return colors, strength
 

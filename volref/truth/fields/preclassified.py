@@ -29,7 +29,7 @@ class PreclassifiedField(Field):
     def look(self, samples: Samples, work: Workspace) -> tuple[Floats, Floats]:
         """Return the interpolated straight colours (3, n) and strength (n,)."""
         position = samples.absolute()
-        found = np.stack([trilinear(grid, position.copy(), work) for grid in self.channels])
+        found = np.stack([trilinear(grid, position.copy(), work).copy() for grid in self.channels])
         np.maximum(found[3], 0.0, out=found[3])
         if self.interpolation == "opacity":
             np.minimum(found[3], 1.0, out=found[3])

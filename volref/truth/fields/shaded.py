@@ -16,7 +16,7 @@ from volref.scene.transfer import TransferFunction
 from volref.scene.transfer2d import TransferFunction2D
 from volref.scene.volume import Volume
 from volref.stages.classify import Table, classify, lookup_table
-from volref.stages.gradients import cell_gradient, differentiated, in_world, sobel_kernels
+from volref.stages.gradients import cell_gradient, in_world, length_and_direction, sobel
 from volref.stages.lighting import brightest_lit, lit_colors
 from volref.stages.lookup2d import gradient_factor, lookup_2d
 from volref.stages.sampling import PAD, Grid, cell_corners, grid_of, padded_samples, trilinear
@@ -50,18 +50,17 @@ class ShadedField(Field):
         colors, strength = classify(self.table, values, work)
         seen = np.flatnonzero(strength > 0)
         gradient = self.gradient_at(position.take(seen, axis=1), work)
-        magnitude = np.sqrt(gradient[0] ** 2 + gradient[1] ** 2 + gradient[2] ** 2)
+        magnitude, uphill = length_and_direction(gradient)
         if isinstance(self.transfer, TransferFunction2D):
             seen_colors, strength[seen] = lookup_2d(self.transfer, values.take(seen), magnitude)
         else:
             seen_colors = colors.take(seen, axis=1)
             strength[seen] *= gradient_factor(self.transfer, magnitude)
         if self.lights:
-            # Outwards: from the greater values to the lesser.
-            normals = -gradient / np.where(magnitude > 0, magnitude, 1.0)
             points = self._in_the_world(position.take(seen, axis=1))
             viewer = samples.viewer_of(seen)
-            seen_colors = lit_colors(self.lights, self.material, points, normals, viewer, seen_colors)
+            # Outwards: from the greater values to the lesser.
+            seen_colors = lit_colors(self.lights, self.material, points, -uphill, viewer, seen_colors)
         colors[:, seen] = seen_colors
         return colors, strength
 
@@ -95,6 +94,9 @@ class ShadedField(Field):
     def _cell_gradient(self, position: Floats) -> Floats:
         """Return the gradient of the interpolated field itself; on a face that of the cell behind it."""
         whole: Indices = np.floor(position).astype(np.intp)
+        if self.volume.centering == "node":
+            # The outer faces are those of the cells within: nothing lies beyond them, not even by rounding.
+            np.clip(whole, PAD, np.array(self.volume.size)[:, None] - 2 + PAD, out=whole)
         return cell_gradient(cell_corners(self.grid, list(whole)), position - whole)
 
     def _in_the_world(self, position: Floats) -> Floats:
@@ -110,10 +112,9 @@ def shaded_field(scene: Scene, plan: Plan) -> ShadedField:
     assert transfer is not None
     material = scene.material or Material()
     brightest, lights = float(scene.envelope.colors.max()), scene.lights if scene.lights_volume else ()
-    sobel: tuple[Grid, ...] = ()
+    components: tuple[Grid, ...] = ()
     if scene.gradient == "sobel":
-        kind = np.float64 if volume.values.itemsize > 4 else np.float32
-        sobel = tuple(padded_samples(part) for part in differentiated(volume.values, sobel_kernels(), kind))
+        components = tuple(padded_samples(part) for part in sobel(volume.values))
     return ShadedField(
         **box_of(volume),
         reach=reach_of(plan, volume.index_from_world),
@@ -128,5 +129,5 @@ def shaded_field(scene: Scene, plan: Plan) -> ShadedField:
         gradient=scene.gradient,
         grid=grid_of(volume),
         table=lookup_table(scene.envelope, volume.value_bounds),
-        sobel=sobel,
+        sobel=components,
     )
