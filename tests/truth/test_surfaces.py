@@ -10,6 +10,7 @@ from volref.scene.mesh import Mesh
 from volref.scene.scene import Scene
 from volref.scene.transfer import TransferFunction
 from volref.scene.volume import Volume
+from volref.stages.rays import pixel_rays
 from volref.truth.surfaces import visible_surface
 
 EPS = np.finfo(np.float64).eps
@@ -113,8 +114,6 @@ def test_embree_sees_the_same_triangles():
     """
     from trimesh import Trimesh
     from trimesh.ray.ray_pyembree import RayMeshIntersector
-
-    from volref.stages.rays import pixel_rays
 
     scene = Scene(None, None, PERSPECTIVE, WIDTH, HEIGHT, meshes=[bumpy_sphere(1600)])
     mesh = scene.meshes[0]
@@ -333,6 +332,61 @@ def test_vertex_colours_are_perspective_correct():
     rows = np.flatnonzero(inside[:, 30])
     straight = np.interp(rows, rows[[0, -1]], place[rows[[0, -1]], 30, 1])
     assert np.abs(straight - place[rows, 30, 1]).max() > 0.1
+
+
+def hit_points(scene, surface):
+    """Return the pixels that show a mesh, and where their rays meet it."""
+    pixels = np.flatnonzero(surface.mesh.ravel() >= 0)
+    rays = pixel_rays(scene.camera, scene.width, scene.height, pixels)
+    return pixels, rays.origins + surface.distance.ravel()[pixels, None] * rays.directions
+
+
+@pytest.mark.parametrize("name", CAMERAS)
+@pytest.mark.parametrize("coloring", ["vertex", "texture"])
+def test_attributes_that_are_linear_in_space_are_so_on_the_image_of_every_camera(name, coloring):
+    """A colour, or a texture of a ramp, that grows along x and z: known wherever a ray ends."""
+    shape = bumpy_sphere(400)
+    place = (shape.vertices[:, [0, 2]] + 2) / 4
+    if coloring == "vertex":
+        style = {"colors": np.column_stack([place, place[:, 0]])}
+    else:
+        ramp = (np.arange(64) + 0.5) / 64
+        texture = np.zeros((64, 64, 3))
+        texture[..., 0], texture[..., 1], texture[..., 2] = ramp, ramp[::-1, None], ramp
+        style = {"uv": place, "texture": texture}
+    mesh = Mesh(shape.vertices, shape.faces, **style)
+    scene = Scene(None, None, CAMERAS[name], 48, 40, meshes=[mesh])
+    surface = visible_surface(scene)
+    pixels, points = hit_points(scene, surface)
+    assert len(pixels) > 50
+    expected = (points[:, [0, 2, 0]] + 2) / 4
+    # A point to 40 eps of 4 over a cosine of 1 : 100, 1/4 of that as a colour; at an edge, the z-buffer's
+    # grid of 2^-16 pixel of 0.1 may take the point of a triangle beside the ray.
+    error = np.abs(surface.color.reshape(-1, 3)[pixels] - expected).max(axis=1)
+    assert np.quantile(error, 0.99) <= 4000 * EPS
+    assert error.max() <= 0.1 * 2.0**-16
+
+
+@pytest.mark.parametrize("name", CAMERAS)
+def test_front_and_back_sides_together_are_the_whole_and_show_their_side(name):
+    shape = bumpy_sphere(400)
+    both, front, back = (
+        visible_surface(
+            Scene(None, None, CAMERAS[name], 48, 40, meshes=[Mesh(shape.vertices, shape.faces, sides=sides)])
+        )
+        for sides in ("both", "front", "back")
+    )
+    np.testing.assert_array_equal(np.minimum(front.distance, back.distance), both.distance)
+    corners = shape.vertices[shape.faces]
+    outward = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    rays = pixel_rays(CAMERAS[name], 48, 40, np.arange(48 * 40))
+    for surface, sign in ((front, -1), (back, 1)):
+        hit = surface.face.ravel() >= 0
+        normals = outward[surface.face.ravel()[hit]]
+        cosine = (normals * rays.directions[hit]).sum(axis=1) / np.linalg.norm(normals, axis=1)
+        # A ray that the grid of 2^-16 pixel puts on a triangle's far side may see it edge-on.
+        assert (sign * cosine > -1e-5).all()
+        assert hit.sum() > 20 or ("inside" in name and surface is front)
 
 
 def test_a_texel_seen_straight_on_fills_its_pixel_at_half_a_pixel():
