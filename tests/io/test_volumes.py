@@ -3,6 +3,7 @@
 import gzip
 import json
 import sys
+import zipfile
 
 import nibabel
 import nrrd
@@ -191,12 +192,26 @@ def test_nan_voxels_are_replaced_when_asked(tmp_path):
     assert load_volume(tmp_path / "f.npy", nan=-1.0).values[1, 2, 3] == -1
 
 
-@pytest.mark.parametrize(("module", "suffix"), [("nrrd", ".nrrd"), ("nibabel", ".nii")])
-def test_a_missing_reader_is_one_sentence_with_the_command(tmp_path, monkeypatch, module, suffix):
+@pytest.mark.parametrize(
+    ("module", "name"),
+    [
+        ("nrrd", "f.nrrd"),
+        ("nibabel", "f.nii"),
+        ("pydicom", "f.dcm"),
+        ("tifffile", "f.tif"),
+        ("h5py", "f.h5"),
+        ("zarr", "f.zarr.zip"),
+    ],
+)
+def test_a_missing_reader_is_one_sentence_with_the_command(tmp_path, monkeypatch, module, name):
     monkeypatch.setitem(sys.modules, module, None)
-    (tmp_path / f"f{suffix}").write_bytes(b"NRRD0004\n")
-    with pytest.raises(FormatError, match=r"pip install 'volref\[(nrrd|nifti)\]'$"):
-        load_volume(tmp_path / f"f{suffix}")
+    starts = {"f.nrrd": b"NRRD0004\n", "f.dcm": b"\0" * 128 + b"DICM", "f.tif": b"II*\0" + b"\0" * 12}
+    (tmp_path / name).write_bytes(starts.get(name, b"x"))
+    if name == "f.zarr.zip":
+        with zipfile.ZipFile(tmp_path / name, "w") as archive:
+            archive.writestr("zarr.json", "{}")
+    with pytest.raises(FormatError, match=r"pip install 'volref\[(nrrd|nifti|dicom|tiff|hdf5|zarr)\]'$"):
+        load_volume(tmp_path / name)
 
 
 @pytest.mark.parametrize(
