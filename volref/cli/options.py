@@ -209,7 +209,7 @@ def add_statements(parser: argparse.ArgumentParser, what: str) -> None:
         action="append",
         default=[],
         help=f"tell what {what} does not say: spacing, origin, direction, centering; for RAW also size, "
-        "dtype, byte_order, skip; key for .npz, .h5, .zarr, .bvp and DICOM; level and index for OME-Zarr; for a "
+        "dtype, byte_order, skip; key for .npz, .h5, .zarr, .bvp and DICOM; level, index for OME-Zarr; for a "
         "PNG slice atlas tiles_across, tiles_down, slices",
     )
 
