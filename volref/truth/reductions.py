@@ -298,10 +298,11 @@ def _sharpened(prepared: Reducible, ways: _Ways, pieces: Pieces, middle: Floats,
 def _sampled(sign: float, prepared: Reducible, ways: _Ways) -> Floats:
     """Return the greatest of some values along each ray (R,), of the field times `sign`."""
     length = ways.spans.t_far - ways.spans.t_near
-    fastest = np.abs(ways.directions).max(axis=0)
-    count = max(int(np.ceil((length * fastest).max(initial=0.0) / SAMPLES_APART)), 1)
-    share = (np.arange(count) + 0.5)[:, None] / count
-    return np.asarray((sign * _values_at(prepared, ways, ways.spans.t_near + share * length)).max(axis=0))
+    stride = SAMPLES_APART / np.abs(ways.directions).max(axis=0)
+    count = max(int(np.ceil((length / stride).max(initial=0.0))), 1)
+    # A ray's samples do not depend on those beside it: what is too much lies at its far end.
+    along = np.minimum((np.arange(count) + 0.5)[:, None] * stride, length)
+    return np.asarray((sign * _values_at(prepared, ways, ways.spans.t_near + along)).max(axis=0))
 
 
 def _mean(prepared: Reducible, ways: _Ways, *, precise: bool) -> tuple[Estimates, int]:

@@ -24,7 +24,8 @@ ROUNDOFF = 2.0**-53
 # them, where rounding would decide.
 EDGE = 2.0**-40
 
-# Positions this many times their error from a sample are taken to be it, so that its value is met exactly.
+# Positions that lie from a sample by this many times what rounding can do are taken to be it, so that its
+# value is met exactly; the bound covers what that moves them.
 SNAP = 4.0
 
 
@@ -93,7 +94,9 @@ def _met(plane: Plane, rays: Rays, index_from_world: Floats) -> _Points:
         error = ROUNDOFF * (2 * np.abs(moved) + np.abs(index)) + t_error * np.abs(directions)
         near = np.rint(index)
         shift = np.abs(index - near)
-        snapped = shift <= SNAP * error + 4 * ROUNDOFF * (np.abs(origins) + np.abs(near))
+        # The camera puts its rays where it is asked to but for some roundings of world coordinates.
+        size = np.abs(index_from_world[:3, :3]) @ np.abs(rays.origins).T + np.abs(index_from_world[:3, 3:])
+        snapped = shift <= SNAP * (error + 4 * ROUNDOFF * size)
         error = np.where(snapped, error + shift, error)
     return _Points(t, t_error, np.where(snapped, near, index), error)
 
