@@ -62,6 +62,7 @@ if TYPE_CHECKING:
         clip_box,
     )
     from volref.scene.arcball import arcball_rotation, drag
+    from volref.scene.slices import axis_slice, oblique_slice
     from volref.stages.jitter import jitter_images
     from volref.tonemap import tone_map
     from volref.truth.jittered import render_jittered
@@ -99,6 +100,7 @@ __all__ = [
     "Verification",
     "Volume",
     "arcball_rotation",
+    "axis_slice",
     "cappi",
     "clip_box",
     "compare",
@@ -118,6 +120,7 @@ __all__ = [
     "load_series",
     "load_transfer",
     "load_volume",
+    "oblique_slice",
     "plan",
     "ppi",
     "read_image",
@@ -162,6 +165,7 @@ _HOMES = {
         "clip_box",
     ),
     "volref.scene.arcball": ("arcball_rotation", "drag"),
+    "volref.scene.slices": ("axis_slice", "oblique_slice"),
     "volref.tonemap": ("tone_map",),
     "volref.truth.radar.resampling": ("resample_radar",),
     "volref.truth.radar.slices": ("RadarMap", "cappi", "ppi"),
