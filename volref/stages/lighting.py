@@ -83,13 +83,13 @@ def _arriving(light: Light, points: Floats, towards_viewer: Floats) -> tuple[Flo
 def _aligned(
     model: str, normals: Floats, towards_light: Floats, towards_viewer: Floats, facing: Floats
 ) -> Floats:
-    """Return how well the reflection meets the viewer (n,), at least 0."""
+    """Return how well the reflection meets the viewer (n,), in 0..1: an ulp more to a high power is much."""
     if model == "phong":
         mirrored = 2.0 * facing * normals - towards_light
-        return np.asarray(np.maximum(_dot(mirrored, towards_viewer), 0.0))
+        return np.asarray(np.clip(_dot(mirrored, towards_viewer), 0.0, 1.0))
     halfway = towards_light + towards_viewer
     length = np.sqrt(_dot(halfway, halfway))
-    return np.asarray(np.maximum(_dot(normals, halfway), 0.0) / np.where(length > 0, length, 1.0))
+    return np.asarray(np.clip(_dot(normals, halfway) / np.where(length > 0, length, 1.0), 0.0, 1.0))
 
 
 def _dot(a: Floats, b: Floats) -> Floats:
