@@ -274,10 +274,7 @@ def test_clipping_planes_cut_volume_and_meshes_where_they_leave_a_smaller_box(ca
     low, high = np.array([1.0, 1.0, 1.0]), np.array([5.0, 4.5, 3.0])
     glass = box_mesh(high - low, (low + high) / 2, colors=(0.2, 0.5, 0.9))
     glass = dataclasses.replace(glass, opacity=0.4)
-    cut = box_scene([glass], camera)
-    # A plan says nothing of clipping planes.
-    cut, plan = dataclasses.replace(cut, clip=planes), vr.plan(cut, method="exact", tolerance=1e-12)
-    out = vr.render(cut, plan=plan, method="exact", tolerance=1e-12)
+    out = vr.render(dataclasses.replace(box_scene([glass], camera), clip=planes), tolerance=1e-12)
     low[0], high[1] = 2.0, 3.5
     smaller = box_mesh(high - low, (low + high) / 2)
     triangles = smaller.vertices[smaller.faces]
