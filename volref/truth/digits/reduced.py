@@ -6,9 +6,12 @@ code with the integrators.
 
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from fractions import Fraction
 from itertools import pairwise
 
+from volref.scene.plane import Plane
+from volref.scene.scene import Scene
 from volref.scene.transfer import TransferFunction
 from volref.scene.volume import Volume
 from volref.truth.digits.lattice import (
@@ -22,6 +25,71 @@ from volref.truth.digits.lattice import (
 )
 from volref.truth.digits.pieces import evaluate, meeting, turning_points
 from volref.truth.digits.table import Context, Number, exact_table
+
+# A point up to this many indices outside the volume's faces counts as inside of a slice.
+EDGE = Fraction(1, 2**40)
+
+
+@dataclass(frozen=True)
+class FloatRay:
+    """A float64 ray in index space, and in the world, that ends at `distance` before the colour `behind`."""
+
+    origin: Sequence[float]
+    direction: Sequence[float]
+    world_origin: Sequence[float]
+    world_direction: Sequence[float]
+    distance: float
+    behind: Sequence[float]
+
+
+def reduced_rgba(mp: Context, scene: Scene, ray: FloatRay) -> tuple[Number, ...]:
+    """Return the rgba of a ray in the mode of its scene, which is not "composite"."""
+    volume, transfer = scene.gridded
+    place = volume, ray.origin, ray.direction
+    behind = tuple(map(mp.mpf, ray.behind))
+    if scene.isovalue is not None:
+        t = first_meeting(mp, scene.isovalue, *place, distance=ray.distance)
+        table = exact_table(mp, transfer)
+        color = table.intervals[table.interval_of(scene.isovalue)].color_at(mp.mpf(scene.isovalue))
+        return behind if t is None else (*color, mp.one)
+    if scene.slice_plane is not None:
+        value = value_on_plane(mp, scene.slice_plane, volume, ray)
+    else:
+        value = reduced_value(mp, scene.mode, *place, distance=ray.distance)
+    return behind if value is None else layer(mp, transfer, value, ray.behind)
+
+
+def value_on_plane(mp: Context, plane: Plane, volume: Volume, ray: FloatRay) -> Number | None:
+    """Return the value at the point of the ray in index space whose t is that of the plane in the world.
+
+    None where the ray has no such point within the volume and before its end.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from mpmath import mp
+    >>> volume = Volume(np.array([0.0, 4.0]).reshape(1, 1, 2))
+    >>> ray = FloatRay(*[(-1, 0, 0), (1, 0, 0)] * 2, 9.0, (0, 0, 0, 0))
+    >>> float(value_on_plane(mp, Plane((0.75, 0, 0), (1, 0, 0)), volume, ray))
+    3.0
+    """
+    point, normal = exact_point(plane.point.tolist()), exact_point(plane.normal.tolist())
+    origin, direction = exact_point(ray.world_origin), exact_point(ray.world_direction)
+    along = sum((n * d for n, d in zip(normal, direction, strict=True)), Fraction(0))
+    if along == 0:
+        return None
+    t = sum((n * (p - o) for n, p, o in zip(normal, point, origin, strict=True)), Fraction(0)) / along
+    if t < 0 or t > ray.distance:
+        return None
+    place = [o + t * d for o, d in zip(exact_point(ray.origin), exact_point(ray.direction), strict=True)]
+    low, high = (exact_point(corner.tolist()) for corner in volume.index_bounds)
+    if any(not a - EDGE <= p <= b + EDGE for a, p, b in zip(low, place, high, strict=True)):
+        return None
+    x, y, z = (min(max(p, a), b) for a, p, b in zip(low, place, high, strict=True))
+    cell = math.floor(x), math.floor(y), math.floor(z)
+    still = Fraction(0), Fraction(0), Fraction(0)
+    samples = corner_samples(volume.values, cell)
+    return _rounded(mp, cubic_in_cell(samples, cell, (x, y, z), still, Fraction(0), Fraction(1))[0])
 
 
 def reduced_value(
