@@ -279,9 +279,7 @@ def radar_ray(radar, transfer, value_at, box, origin, direction, step, backgroun
         if value is None:
             continue
         opacity = segment_opacity(transfer, value, length)
-        shade = [
-            table_value(transfer.values.tolist(), transfer.colors[:, c].tolist(), value) for c in range(3)
-        ]
+        shade = [table_value(transfer.values.tolist(), column, value) for column in columns]
         color = [c + transmittance * opacity * s for c, s in zip(color, shade, strict=True)]
         transmittance *= 1 - opacity
     rgb = [c + transmittance * b for c, b in zip(color, background, strict=False)]

@@ -114,7 +114,7 @@ def shaded_field(scene: Scene, plan: Plan) -> ShadedField:
     brightest, lights = float(scene.envelope.colors.max()), scene.lights if scene.lights_volume else ()
     components: tuple[Grid, ...] = ()
     if scene.gradient == "sobel":
-        components = tuple(padded_samples(part) for part in sobel(volume.values))
+        components = tuple(padded_samples(sobel(volume.values, axis)) for axis in range(3))
     return ShadedField(
         **box_of(volume),
         reach=reach_of(plan, volume.index_from_world),
