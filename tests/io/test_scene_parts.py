@@ -44,7 +44,8 @@ def saved_and_loaded(scene, folder):
         {"lights": LIGHTS, "material": vr.Material("blinn-phong", ambient=1 / 3, two_sided=True)},
         {"mode": "isosurface", "isovalue": 0.1 + 0.2, "gradient": "sobel"},
         {"mode": "slice", "slice_plane": PLANES[0], "clip": PLANES},
-        {"mode": "mip", "classification": "per-slice"},
+        {"mode": "mip"},
+        {"classification": "per-slice"},
         {"material": vr.Material("unlit"), "classification": "pre"},
     ],
 )

@@ -13,6 +13,7 @@ from tests.scenes import camera_towards, rough_scene
 from volref.phantoms.meshes import sphere_mesh
 from volref.scene.footprint import Rectangle
 from volref.truth.canvas import Canvas, light_behind
+from volref.truth.integration import Integrated, worker
 from volref.truth.parts import cut, runs, tiles
 from volref.truth.surfaces import visible_surface
 
@@ -81,10 +82,14 @@ def test_of_a_pixel_that_nothing_reached_nothing_is_claimed():
 def test_what_was_known_better_stays():
     canvas = Canvas(rough_scene(2, 1), None)
     both = np.array([0, 1])
-    canvas.put(both, np.full((2, 4), 0.1), np.array([0.3, 0.3]), 5)
-    canvas.put(both, np.full((2, 4), 0.2), np.array([0.2, 0.4]), 7, only_better=True)
+
+    def known(color, *bound, samples):
+        return Integrated(np.full((len(bound), 4), color), np.array(bound), samples, worker())
+
+    canvas.put(both, known(0.1, 0.3, 0.3, samples=5))
+    canvas.put(both, known(0.2, 0.2, 0.4, samples=7), only_better=True)
     assert (canvas.rgba[:, 0].tolist(), canvas.bound.tolist(), canvas.samples) == ([0.2, 0.1], [0.2, 0.3], 12)
-    canvas.put(both[:1], np.full((1, 4), 0.5), np.array([0.9]), 1)
+    canvas.put(both[:1], known(0.5, 0.9, samples=1))
     assert (canvas.rgba[:, 0].tolist(), canvas.bound.tolist()) == ([0.5, 0.1], [0.9, 0.3])
 
 

@@ -14,6 +14,7 @@ from volref.planning.choices import (
     MOST_DEFAULT_SEGMENTS,
     TERMINATION,
     background_stage,
+    cells_stages,
     colour_stage,
     early_termination,
     empty_space,
@@ -24,6 +25,7 @@ from volref.planning.choices import (
     never_needed,
     precision_of,
     sampled_because,
+    shows,
     step_length,
     volume_stage,
 )
@@ -94,14 +96,17 @@ def plan(
     if not isinstance(scene, Scene):
         message = f"scene must be a volref.Scene, got {type(scene).__name__}; build or load one first"
         raise SceneError(message)
-    _refuse_what_is_not_built(scene)
     one_of("method", method, METHODS)
     number("tolerance", tolerance, above=0)
     sampled = sampled_because(scene)
     if method == "exact" and sampled:
         message = f"method must be 'march' or 'auto' for {sampled}, got 'exact'; the result is an estimate"
         raise SceneError(message)
-    if method == "auto" and certified and not sampled:
+    reduced = scene.mode != "composite" and scene.volume is not None and not sampled
+    if method == "march" and reduced:
+        message = f"method must be 'exact' or 'auto' in mode {scene.mode!r}, got 'march'; both are exact"
+        raise SceneError(message)
+    if reduced or (method == "auto" and certified and not sampled):
         method = "exact"
     if method != "march":
         if step is not None:
@@ -113,7 +118,7 @@ def plan(
         stages.append(Stage("volume", included=False, reason="the scene has none"))
         return Plan(scene, method, 0.0, tolerance, 0.0, 0, None, (*stages, background_stage(scene)))
     length, most_segments = step_length(scene, step)
-    seen = bool(may_be_seen(scene.envelope, *map(np.array, scene.volume.value_bounds)))
+    seen = shows(scene)
     stages.append(volume_stage(scene, seen=seen))
     if not seen:
         return Plan(scene, method, length, tolerance, 0.0, 0, None, (*stages, background_stage(scene)))
@@ -147,29 +152,16 @@ def plan(
     )
 
 
-def _refuse_what_is_not_built(scene: Scene) -> None:
-    """Refuse what a scene can say and no integrator does yet: an image without it would be wrong."""
-    plain: dict[str, object] = {"mode": "composite"}
-    for name, value in plain.items():
-        if getattr(scene, name) != value:
-            message = f"scene.{name} must be {value!r} in this version, got another; render it without"
-            raise SceneError(message)
-
-
 def _stepless(scene: Scene, method: str, tolerance: float) -> Plan:
     """Return the plan of a method that chooses its own steps."""
     stages = [meshes_stage(scene)]
     if scene.volume is None or scene.transfer is None:
         stages.append(Stage("volume", included=False, reason="the scene has none"))
     else:
-        seen = bool(may_be_seen(scene.envelope, *map(np.array, scene.volume.value_bounds)))
+        seen = shows(scene)
         stages.append(volume_stage(scene, seen=seen))
         if seen:
-            reason = "cells that are transparent are not integrated"
-            stages.append(missing_rays(scene))
-            stages.append(
-                Stage("empty space", included=True, reason=reason, saves="their crossings and cubics")
-            )
+            stages.extend([missing_rays(scene), *cells_stages(scene)])
             stages.extend([*light_stages(scene), *never_needed()])
     stages.append(background_stage(scene))
     return Plan(scene, method, 0.0, tolerance, 0.0, 0, None, tuple(stages))

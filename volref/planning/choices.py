@@ -52,6 +52,35 @@ def missing_rays(scene: Scene) -> Stage:
     return Stage("rays that miss", included=False, reason=reason, saves="their rays")
 
 
+def shows(scene: Scene) -> bool:
+    """Tell whether any value of the volume shows."""
+    assert scene.volume is not None
+    low, high = scene.volume.value_bounds
+    if scene.isovalue is not None:
+        return low <= scene.isovalue <= high
+    return bool(may_be_seen(scene.envelope, np.array(low), np.array(high)))
+
+
+def cells_stages(scene: Scene) -> list[Stage]:
+    """Cross only the cells that count."""
+    saves = "their crossings and cubics"
+    cells = {
+        "composite": "cells that are transparent are not integrated",
+        "mip": "blocks whose values some samples of the ray beat already are passed by",
+        "minip": "blocks whose values some samples of the ray beat already are passed by",
+        "isosurface": "blocks that do not hold the isovalue are passed by",
+    }
+    stages = []
+    if scene.mode in cells:
+        stages.append(Stage("empty space", included=True, reason=cells[scene.mode], saves=saves))
+    if scene.mode != "composite":
+        found = {"isosurface": "the first crossing of the isovalue", "slice": "the value on the plane"}
+        words = {"mip": "greatest", "minip": "least", "average": "mean"}
+        reason = found.get(scene.mode) or f"the {words[scene.mode]} value of each ray, then looked up once"
+        stages.append(Stage("reduction", included=True, reason=reason))
+    return stages
+
+
 def light_stages(scene: Scene) -> list[Stage]:
     """Take gradients and light only if the look of the volume depends on them."""
     reason = "the volume is not lit, and the transfer function is of the value alone"
@@ -83,9 +112,9 @@ def sampled_because(scene: Scene) -> str:
         return "a radar volume"
     if isinstance(scene.transfer, TransferFunction2D):
         return "a transfer function of value and gradient"
-    if scene.lights_volume:
+    if scene.lights_volume and scene.mode == "composite":
         return "a lit volume"
-    if scene.needs_gradient:
+    if scene.needs_gradient and scene.mode == "composite":
         return "gradient opacity"
     return "" if scene.classification == "post" else f"classification {scene.classification!r}"
 

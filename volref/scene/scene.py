@@ -43,8 +43,8 @@ class Scene:
     meshes
         Surfaces; opaque ones end the volume integral where the ray meets them.
     lights
-        Without any, the volume's colours are emitted as they are, and so are those of a radar volume.  Meshes
-        answer them if they are `lit`.
+        Without any, the volume's colours are emitted as they are, and so are those of a radar volume, and of
+        modes other than "composite" and "isosurface".  Meshes answer them if they are `lit`.
     material
         How the volume and lit meshes answer lights; default `Material()`.  With model "unlit" the volume does
         not, and meshes answer as `Material()`.
@@ -165,7 +165,8 @@ class Scene:
     def lights_volume(self) -> bool:
         """Whether the volume answers lights."""
         unlit = self.material is not None and self.material.model == "unlit"
-        return bool(self.lights) and isinstance(self.volume, Volume) and not unlit
+        shown_as_it_is = unlit or self.mode not in ("composite", "isosurface")
+        return bool(self.lights) and isinstance(self.volume, Volume) and not shown_as_it_is
 
     @property
     def needs_gradient(self) -> bool:
@@ -184,18 +185,28 @@ class Scene:
 
 def _check_look(scene: Scene) -> None:
     """Refuse what does not go together."""
-    name = ""
+    transfer, sampled_after = scene.transfer, scene.classification == "post"
+    by_gradient = transfer is not None and (
+        not isinstance(transfer, TransferFunction) or transfer.gradient_opacity is not None
+    )
     if isinstance(scene.volume, RadarVolume):
-        kind, needed = "a radar volume", "resample it to a Volume first"
-        if scene.needs_gradient:
-            name, got = "transfer", "one that asks for the gradient"
-        elif scene.classification != "post":
-            name, got = "classification", repr(scene.classification)
-    elif scene.classification != "post" and scene.needs_gradient:
-        kind, needed = f"classification {scene.classification!r}", "use classification 'post'"
-        name, got = ("material", "a lit one") if scene.lights_volume else ("transfer", "one of the gradient")
-    if name:
-        message = f"scene.{name} must suit {kind}, which has no gradient, got {got}; {needed}"
+        what, cure = "a radar volume, which has no gradient", "resample it to a Volume first"
+    elif scene.mode != "composite":
+        what, cure = f"mode {scene.mode!r}", "use mode 'composite'"
+    elif not sampled_after:
+        what, cure = f"classification {scene.classification!r}", "use 'post'"
+        sampled_after = True
+    else:
+        return
+    names = {"transfer": by_gradient, "classification": not sampled_after}
+    if scene.mode == "composite":
+        names["material"] = scene.lights_volume
+    for name in (name for name, wrong in names.items() if wrong):
+        got = {"transfer": "one of the gradient", "material": "a lit one"}.get(name, scene.classification)
+        message = f"scene.{name} must suit {what}, got {got}; {cure}"
+        raise SceneError(message)
+    if scene.mode in ("mip", "minip", "average") and any(mesh.transparent for mesh in scene.meshes):
+        message = f"scene.meshes must be opaque in {what}, got a transparent one; give it opacity 1"
         raise SceneError(message)
 
 

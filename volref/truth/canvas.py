@@ -35,6 +35,7 @@ class Canvas:
             self.layers = visible_layers(scene, surface)
         self.distance = np.full(pixels, np.inf) if surface is None else surface.distance.reshape(-1)
         self.rgba, self.bound = np.zeros((pixels, 4)), np.full(pixels, np.inf)
+        self.hit = np.full(pixels, np.inf) if scene.mode == "isosurface" else None
         self.samples = 0
 
     def behind(self, pixels: Indices) -> Floats:
@@ -74,15 +75,18 @@ class Canvas:
             anything = _anything(self.scene, self.behind(pixels), self.layers_of(pixels))
             self.rgba[pixels], self.bound[pixels] = anything
 
-    def put(
-        self, pixels: Indices, rgba: Floats, bound: Floats, samples: int, *, only_better: bool = False
-    ) -> None:
+    def put(self, pixels: Indices, done: Integrated, *, only_better: bool = False) -> None:
         """Fill in `pixels`, or those of them that were not known better."""
-        self.samples += samples
-        if only_better:
-            better = bound <= self.bound[pixels]
-            pixels, rgba, bound = pixels[better], rgba[better], bound[better]
-        self.rgba[pixels], self.bound[pixels] = rgba, bound
+        self.samples += done.samples
+        kept = done.bound <= self.bound[pixels] if only_better else np.ones(len(pixels), np.bool_)
+        pixels = pixels[kept]
+        self.rgba[pixels], self.bound[pixels] = done.rgba[kept], done.bound[kept]
+        if self.hit is not None and done.hit is not None:
+            self.hit[pixels] = done.hit[kept]
+
+    def distances(self) -> Floats:
+        """Return the distance (H W,) of the first opaque surface or isosurface."""
+        return self.distance if self.hit is None else np.minimum(self.distance, self.hit)
 
 
 def light_behind(scene: Scene, surface: Surface | None, pixels: Indices) -> Floats:

@@ -87,7 +87,7 @@ class Crew:
             for count, (number, done) in enumerate(all_done, start=1):
                 if done is not None:
                     pixels = _joined(parts, tasks[number])
-                    canvas.put(pixels, done.rgba, done.bound, done.samples, only_better=only_better)
+                    canvas.put(pixels, done, only_better=only_better)
                     self._seen.add(done.worker)
                 if self.progress is not None:
                     self.progress(count, len(tasks))

@@ -83,6 +83,7 @@ def run_errand(
         np.concatenate([part.bound for part in done]),
         sum(part.samples for part in done),
         done[0].worker,
+        None if done[0].hit is None else np.concatenate([part.hit for part in done if part.hit is not None]),
     )
 
 

@@ -55,6 +55,7 @@ def integrate_layered(
     counts = np.zeros(len(pixels), np.intp) if layers is None else layers.counts
     tolerances = [tolerance] if layers is None else _shared_out(layers, tolerance)
     rgba, bound, end, samples = behind.copy(), np.zeros(len(pixels)), end.copy(), 0
+    hit = np.full(len(pixels), np.inf)
     for rank in reversed(range(counts.max(initial=0))):
         assert layers is not None
         has = np.flatnonzero(counts > rank)
@@ -62,12 +63,15 @@ def integrate_layered(
         near = layers.distance[its]
         slab = _slab(integration, pixels[has], near, end[has], rgba[has], tolerances[rank + 1])
         samples += slab.samples
+        if slab.hit is not None:
+            hit[has] = np.minimum(hit[has], slab.hit)
         rgba[has], bound[has] = _layer_over(
             layers.color[its], layers.opacity[its], slab.rgba, (slab.bound + bound[has]) * UPWARDS
         )
         end[has] = near
     slab = _slab(integration, pixels, begin, end, rgba, tolerances[0])
-    return Integrated(slab.rgba, (slab.bound + bound) * UPWARDS, samples + slab.samples, slab.worker)
+    nearest = None if slab.hit is None else np.minimum(hit, slab.hit)
+    return Integrated(slab.rgba, (slab.bound + bound) * UPWARDS, samples + slab.samples, slab.worker, nearest)
 
 
 def _slab(

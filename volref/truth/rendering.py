@@ -83,7 +83,7 @@ def render(
     shape = scene.height, scene.width
     return Render(
         canvas.rgba.reshape(*shape, 4),
-        canvas.distance.reshape(shape),
+        canvas.distances().reshape(shape),
         canvas.bound.reshape(shape),
         kind,
         time.perf_counter() - started,
@@ -111,6 +111,9 @@ def _draw(scene: Scene, plan: Plan, canvas: Canvas, crew: Crew) -> tuple[str, Pl
     if planning.sampled_because(scene):
         return "estimate", march_to_tolerance(scene, plan, canvas, crew, where)
     integration = Integration(scene, plan)
+    if scene.mode != "composite":
+        _draw_exactly(integration, canvas, crew)
+        return "estimate" if scene.lights_volume else "certified", plan
     if plan.method == "auto":
         around = canvas.distance, canvas.all_behind()
         choice = choose(scene, plan, integration.prepared, *around)
