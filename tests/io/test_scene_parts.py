@@ -92,3 +92,15 @@ def test_nothing_is_written_if_one_of_the_files_is_there(tmp_path):
     with pytest.raises(vr.FormatError, match=r"shot.transfer.json"):
         vr.save_scene(scene, tmp_path / "shot.json")
     assert [path.name for path in tmp_path.iterdir()] == ["shot.transfer.json"]
+
+
+def test_a_mesh_file_is_drawn_as_the_scene_says(tmp_path):
+    scene = rough_scene()
+    mesh = vr.Mesh([(0, 0, 0), (1, 0, 0), (0, 1, 0)], [(0, 1, 2)], opacity=0.5)
+    vr.save_scene(dataclasses.replace(scene, meshes=[mesh]), tmp_path / "shot.json")
+    document = json.loads((tmp_path / "shot.json").read_text())
+    document["meshes"][0] |= {"opacity": 0.25, "lit": True, "sides": "front", "back_color": [1, 0, 0]}
+    (tmp_path / "shot.json").write_text(json.dumps(document))
+    (loaded,) = vr.load_scene(tmp_path / "shot.json").meshes
+    assert (loaded.opacity, loaded.lit, loaded.sides) == (0.25, True, "front")
+    assert np.array_equal(loaded.back_color[:3], (1, 0, 0))

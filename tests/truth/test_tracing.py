@@ -1,3 +1,4 @@
+import dataclasses
 import json
 
 import numpy as np
@@ -109,3 +110,49 @@ def test_the_plan_of_another_method_is_refused_with_a_cure():
         vr.trace(scene, (0, 0), plan=vr.plan(scene, method="exact"))
     planned = vr.trace(scene, (0, 0), plan=vr.plan(scene, method="march"))
     assert str(planned) == str(vr.trace(scene, (0, 0)))
+
+
+LOOKS = {
+    "lit": {
+        "lights": [vr.Light.ambient(), vr.Light.point((9, 9, 9))],
+        "material": vr.Material("blinn-phong"),
+    },
+    "analytic": {"lights": [vr.Light.headlight()], "gradient": "analytic"},
+    "pre": {"classification": "pre"},
+    "per-slice": {"classification": "per-slice"},
+    "table": {"transfer": vr.TransferFunction2D(np.random.default_rng(2).random((3, 4, 4)), (0, 1), (0, 2))},
+    "clipped": {"clip": [vr.Plane((2, 2, 2), (1, 0.3, 0.2))]},
+}
+
+
+@pytest.mark.parametrize("look", LOOKS.values(), ids=LOOKS)
+def test_a_trace_goes_through_every_kind_of_field(look):
+    scene = dataclasses.replace(scene_with_a_ball(), **look)
+    out = vr.render(scene, method="march", tolerance=1e-12)
+    for pixel in ((6, 4), (3, 2), (9, 5)):
+        trace = vr.trace(scene, pixel)
+        # Before a ray ends early it has let through 1e-6 at most.
+        np.testing.assert_allclose(trace.head["rgba"], out.rgba[pixel[1], pixel[0]], rtol=0, atol=2e-6)
+        assert ("value" in trace.table) == (look is LOOKS["clipped"])
+
+
+def test_what_a_trace_cannot_show_is_refused():
+    scene = scene_with_a_ball()
+    glass = dataclasses.replace(scene.meshes[0], opacity=0.5)
+    with pytest.raises(vr.SceneError, match=r"must be one volume up to a surface.*got transparent meshes"):
+        vr.trace(dataclasses.replace(scene, meshes=[glass]), (6, 4))
+    with pytest.raises(vr.SceneError, match=r"in mode 'mip', got 'march'"):
+        vr.trace(dataclasses.replace(scene, mode="mip"), (6, 4))
+
+
+def test_a_ray_that_a_plane_cuts_off_says_so():
+    scene = scene_with_a_ball()
+    eye = scene.camera.world_from_view[:3, 3]
+    away = vr.Plane(eye, eye - scene.volume.corners.mean(axis=0))
+    scene = dataclasses.replace(scene, meshes=())
+    assert vr.trace(dataclasses.replace(scene, clip=[away]), (6, 4)).head["ended"] == (
+        "a clipping plane cuts it off"
+    )
+    middle = vr.Plane(scene.volume.corners.mean(axis=0), away.normal)
+    ended = vr.trace(dataclasses.replace(scene, clip=[middle]), (6, 4)).head["ended"]
+    assert ended == "the ray is cut off by a clipping plane"

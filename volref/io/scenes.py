@@ -4,6 +4,7 @@ The schema (`scene_schema()`) says which keys there are.  Paths are relative to 
 inside its folder; numbers in the JSON and arrays beside it come back bit for bit.
 """
 
+import dataclasses
 import json
 from pathlib import Path
 from typing import Any
@@ -63,7 +64,12 @@ def load_scene(path: str | Path, *, allow_outside: bool = False, max_bytes: int 
 
     meshes: list[Mesh] = []
     for entry in document.get("meshes", []):
-        meshes.extend(load_meshes(beside(entry), max_bytes=max_bytes) if "path" in entry else [Mesh(**entry)])
+        if "path" in entry:
+            style = {name: value for name, value in entry.items() if name != "path"}
+            loaded = load_meshes(beside(entry), max_bytes=max_bytes)
+            meshes.extend(dataclasses.replace(mesh, **style) for mesh in loaded)
+        else:
+            meshes.append(Mesh(**entry))
     if "volume" in document and "radar" in document:
         message = f"{file.name} must have a volume or a radar, got both; remove one"
         raise FormatError(message)

@@ -114,7 +114,7 @@ def _draw(scene: Scene, plan: Plan, canvas: Canvas, crew: Crew) -> tuple[str, Pl
     if scene.mode != "composite":
         _draw_exactly(integration, canvas, crew)
         return "estimate" if scene.lights_volume else "certified", plan
-    if plan.method == "auto":
+    if plan.method == "auto" and canvas.layers is None and not scene.clip:
         around = canvas.distance, canvas.all_behind()
         choice = choose(scene, plan, integration.prepared, *around)
         if choice is not None:

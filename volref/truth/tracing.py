@@ -17,12 +17,13 @@ from volref.planning import Plan
 from volref.records import Rays, Surface
 from volref.scene.scene import Scene
 from volref.scene.transform import transform_directions, transform_points
-from volref.stages.classify import classify, segment_opacity
+from volref.stages.classify import segment_opacity
 from volref.stages.rays import pixel_rays
 from volref.stages.sampling import PAD, trilinear
 from volref.stages.spans import box_spans, cut_spans
 from volref.truth.canvas import light_behind
-from volref.truth.fields import PlainField, plain_field
+from volref.truth.fields import Field, PlainField, Samples
+from volref.truth.integration import Integration
 from volref.truth.march import segments_of
 from volref.truth.rendering import decide
 from volref.truth.surfaces import visible_surface
@@ -83,17 +84,21 @@ def trace(
 ) -> Trace:
     """Return every number of the ray through `pixel` (x, y), row 0 at the top.
 
-    `step` and `plan` are as for `render`; early termination and empty space play no part.
+    `step` and `plan` are as for `render`; early termination and empty space play no part.  Where the look of
+    the volume takes more than its value (lights, gradients, radars), the colour and the strength are those
+    after all of it, and the columns of the interpolation are left out.
 
     Raises
     ------
     SceneError
-        If the pixel lies outside the image, or an argument breaks a rule of `volref.plan`.
+        If the pixel lies outside the image, an argument breaks a rule of `volref.plan`, or the scene has
+        transparent meshes or another mode than "composite".
     """
     decided = decide(scene, plan, "march" if plan is None else "auto", step)
     if decided.method != "march":
         message = f"plan must be a march's, got method {decided.method!r}; make one with method='march'"
         raise SceneError(message)
+    _refuse_others(scene)
     x, y = _checked_pixel(scene, pixel)
     flat = np.array([y * scene.width + x])
     rays = pixel_rays(scene.camera, scene.width, scene.height, flat)
@@ -123,28 +128,44 @@ def _surface_words(surface: Surface | None, x: int, y: int) -> dict[str, Any] | 
     }
 
 
+def _refuse_others(scene: Scene) -> None:
+    """Refuse scenes of which one row of segments is not the whole ray."""
+    other = "" if scene.mode == "composite" else f"mode {scene.mode!r}"
+    other = "transparent meshes" if any(mesh.transparent for mesh in scene.meshes) else other
+    if other:
+        message = f"scene must be one volume up to a surface to be traced, got {other}; trace it without"
+        raise SceneError(message)
+
+
 def _trace_volume(scene: Scene, plan: Plan, rays: Rays, distance: float, head: dict[str, Any]) -> Trace:
     """Trace one ray through the volume of `scene` up to a surface `distance` away, +inf without one."""
-    field = plain_field(scene, plan.everything())
+    integration = Integration(scene, plan.everything())
+    field = integration.field
     origin = transform_points(field.space_from_world, rays.origins).T
     direction = transform_directions(field.space_from_world, rays.directions).T
     box = box_spans(origin, direction, field.low, field.high)
-    spans = cut_spans(box, 0.0, np.array([distance]))
+    pixel = np.array([head["pixel"][1] * scene.width + head["pixel"][0]])
+    begin, end = integration.limits(pixel, np.array([distance]))
+    spans = cut_spans(box, begin, end)
     t_near, t_far = float(spans.t_near[0]), float(spans.t_far[0])
     if t_near >= t_far:
-        missed = box.t_near[0] >= box.t_far[0]
-        ended = "the ray misses the volume" if missed else "a surface lies in front of the volume"
+        missed, cut = box.t_near[0] >= box.t_far[0], distance >= box.t_far[0]
+        ended = "a clipping plane cuts it off" if cut else "a surface lies in front of the volume"
+        ended = "the ray misses the volume" if missed else ended
         return Trace({**head, "span": None, "ended": ended, "rgba": head["behind"]}, {})
     counts, steps = segments_of(spans, plan.step)
     number = np.arange(counts[0])
     start, length = t_near + number * steps[0], np.full(counts[0], steps[0])
     index = origin + direction * t_near + (number + 0.5) * (direction * steps[0])
-    table = _table(scene, field, start, length, index)
+    table = _table(field, start, length, index, -rays.directions[0])
+    if isinstance(field, PlainField):
+        table |= _interpolated(scene, field, index)
     table["t_end"] = np.append(start[1:], t_far)
     table["position"] = rays.origins[0] + table["t"][:, None] * rays.directions[0]
     transmittance = table["transmittance"][-1] - table["weight"][-1]
     rgba = table["accumulated"][-1] + transmittance * np.array(head["behind"])
-    met = "meets an opaque surface" if t_far == distance else "leaves the volume"
+    met = "leaves the volume" if t_far == box.t_far[0] else "is cut off by a clipping plane"
+    met = "meets an opaque surface" if t_far == distance else met
     head = {
         **head,
         "step": float(steps[0]),
@@ -152,7 +173,7 @@ def _trace_volume(scene: Scene, plan: Plan, rays: Rays, distance: float, head: d
         "ended": f"the ray {met}",
         "rgba": rgba.tolist(),
     }
-    return Trace(head, {name: table[name] for name in COLUMNS})
+    return Trace(head, {name: table[name] for name in COLUMNS if name in table})
 
 
 def _checked_pixel(scene: Scene, pixel: Sequence[int]) -> tuple[int, int]:
@@ -163,20 +184,16 @@ def _checked_pixel(scene: Scene, pixel: Sequence[int]) -> tuple[int, int]:
     return x, whole_number("pixel y", pixel[1], low=0, high=scene.height - 1)
 
 
-def _table(
-    scene: Scene, field: PlainField, start: Floats, length: Floats, index: Floats
-) -> dict[str, Numbers]:
+def _table(field: Field, start: Floats, length: Floats, index: Floats, viewer: Floats) -> dict[str, Numbers]:
     """Return the columns of the segments that begin at `start` (S,), but for `position` and `t_end`.
 
-    `index` (3, S) are their samples in index space.
+    `index` (3, S) are their samples in the space of the field, `viewer` (3,) is the way back.
     """
-    volume, _ = scene.gridded
-    work = Workspace()
     t = start + length / 2
-    cell = np.floor(index)
-    value = trilinear(field.grid, index + PAD, work)
-    color, strength = classify(field.table, value, work)
-    opacity = segment_opacity(field.table, strength.copy(), length)
+    towards = np.repeat(viewer[:, None], len(t), axis=1)
+    samples = Samples(index + PAD, np.zeros(index.shape, np.int32), towards)
+    color, strength = (found.copy() for found in field.look(samples, Workspace()))
+    opacity = segment_opacity(field, strength.copy(), length)
     transmittance = np.ones(len(t) + 1)
     accumulated = np.zeros((len(t), 4))
     for k in range(len(t)):
@@ -189,17 +206,25 @@ def _table(
         "segment": np.arange(len(t)),
         "t_start": start,
         "t": t,
-        "index": index.T,
-        "cell": cell.T.astype(np.int64),
-        "fraction": (index - cell).T,
-        "corners": _corner_samples(volume.values, cell.T.astype(np.int64)),
-        "value": value.copy(),
-        "color": color.T.copy(),
-        "strength": strength.copy(),
+        "color": color.T,
+        "strength": strength,
         "opacity": opacity,
         "transmittance": transmittance[:-1],
         "weight": transmittance[:-1] * opacity,
         "accumulated": accumulated,
+    }
+
+
+def _interpolated(scene: Scene, field: PlainField, index: Floats) -> dict[str, Numbers]:
+    """Return the columns that say how the values at `index` (3, S) came about."""
+    volume, _ = scene.gridded
+    cell = np.floor(index)
+    return {
+        "index": index.T,
+        "cell": cell.T.astype(np.int64),
+        "fraction": (index - cell).T,
+        "corners": _corner_samples(volume.values, cell.T.astype(np.int64)),
+        "value": trilinear(field.grid, index + PAD, Workspace()),
     }
 
 

@@ -217,6 +217,8 @@ def verify(
         raise SceneError(message)
     more = sampled_because(scene) or ("clipping planes" if scene.clip else "")
     more = more or ("lights on an isosurface" if scene.lights_volume else "")
+    more = more or ("transparent meshes" if any(mesh.transparent for mesh in scene.meshes) else "")
+    more = more or next((name for name in ("supersampling", "jitter") if out.plan.includes(name)), "")
     if more:
         message = f"scene must show values on a grid as the table has them to be verified, got {more}; "
         raise SceneError(message + "verify one without")
