@@ -3,6 +3,7 @@
 Rays are given in index space: the volumes lie so that it is the world.
 """
 
+import dataclasses
 from fractions import Fraction
 
 import numpy as np
@@ -11,9 +12,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from mpmath import mp
 
+import volref as vr
 from tests.oracles.scalar import table_value
 from tests.scenes import camera_towards, colorful_transfer, rough_volume
 from volref import Camera, Scene, TransferFunction, Volume
+from volref.phantoms.meshes import sphere_mesh
 from volref.records import Rays
 from volref.scene.transform import transform_directions, transform_points
 from volref.stages.rays import pixel_rays
@@ -348,3 +351,17 @@ def test_rays_reduced_in_many_parts_are_the_same(monkeypatch):
     np.testing.assert_array_equal(parts.rgba, whole.rgba)
     np.testing.assert_array_equal(parts.bound, whole.bound)
     assert parts.pieces == whole.pieces
+
+
+@pytest.mark.parametrize("mode", [*MODES, "isosurface", "slice"])
+def test_verify_finds_images_of_all_modes_within_their_bounds_and_a_wrong_one_outside(mode):
+    volume = rough_volume(7, spacing=(1.0, 1.3, 0.7), origin=(3.0, -2.0, 7.0))
+    words = {"isovalue": 0.5} if mode == "isosurface" else {}
+    words |= {"slice_plane": vr.Plane((5, 1, 9), (1, 0.3, 0.5))} if mode == "slice" else {}
+    ball = sphere_mesh(1.0, (6.0, 1.0, 9.0), (0.9, 0.2, 0.1))
+    scene = Scene(volume, colorful_transfer(), camera_towards(volume), 12, 9, [ball], mode=mode, **words)
+    out = vr.render(scene)
+    assert out.bound_kind == "certified"
+    assert vr.verify(scene, out, 40).ok
+    wrong = dataclasses.replace(out, rgba=np.where(out.rgba == 0, 0, out.rgba + 1e-9))
+    assert not vr.verify(scene, wrong, 40).ok
