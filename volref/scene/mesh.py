@@ -33,6 +33,9 @@ SIDES = ("both", "front", "back")
 class Mesh:
     """A surface of triangles, opaque or transparent, lit or not.
 
+    The field `transparent` says whether any of the mesh lets light through.  `dataclasses.replace` gives a
+    mesh another look, as to one from a file.
+
     Parameters
     ----------
     vertices
@@ -60,9 +63,6 @@ class Mesh:
         "both", "front" or "back": the sides of the triangles that are seen.
     back_color
         Colour (3,) of the back sides in place of their own.
-
-    The field `transparent` says whether any of the mesh lets light through.  `dataclasses.replace` gives a
-    mesh another look, as to one from a file.
 
     Raises
     ------

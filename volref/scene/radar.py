@@ -44,6 +44,9 @@ class RadarVolume:
     both sweeps around a point.  Nothing is seen above (the cone of silence), below and beyond them, nor
     where a gate that contributes to the value has no data.
 
+    Of its own it knows `value_bounds`, the least and greatest value, that of no echo among them: every
+    interpolated value lies between.
+
     Parameters
     ----------
     sweeps
@@ -62,9 +65,6 @@ class RadarVolume:
         When it was measured, ISO 8601, or None.
     quantity, units
         What was measured, in ODIM's words, as "DBZH" and "dBZ".
-
-    Of its own it knows `value_bounds`, the least and greatest value, that of no echo among them: every
-    interpolated value lies between.
 
     Raises
     ------
