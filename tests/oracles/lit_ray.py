@@ -7,6 +7,7 @@ It shares no code with volref: its own matrices, gradients, lights and compositi
 import functools
 import itertools
 import math
+from types import SimpleNamespace
 
 from tests.oracles.lookup import bilinear_2d, piecewise
 from tests.oracles.scalar import box_span, cross, normalized, segment_opacity, table_value
@@ -21,6 +22,11 @@ def dot(a, b):
 
 def length_of(a):
     return math.hypot(*a)
+
+
+DEFAULT = SimpleNamespace(
+    model="phong", ambient=0.1, diffuse=0.7, specular=0.2, shininess=10.0, two_sided=False
+)
 
 
 def lit_color(lights, material, point, normal, viewer, color):
@@ -121,17 +127,19 @@ def correlated(values, kernel, x, y, z):
 
 
 def cell_slope(values, index):
-    """Gradient of the trilinear mean itself, by the product rule."""
+    """Gradient of the trilinear mean itself: along an axis the mean of the four edges' differences."""
     low = [math.floor(i) for i in index]
+    part = [i - a for i, a in zip(index, low, strict=True)]
     total = [0.0, 0.0, 0.0]
-    for bits in CORNERS:
-        sample = clamped(values, *(a + bit for a, bit in zip(low, bits, strict=True)))
-        for axis in range(3):
-            share = 1.0 if bits[axis] else -1.0
-            for k in range(3):
-                if k != axis:
-                    share *= index[k] - low[k] if bits[k] else 1 - (index[k] - low[k])
-            total[axis] += share * sample
+    for axis, bits in itertools.product(range(3), itertools.product((0, 1), repeat=2)):
+        share, ends = 1.0, []
+        others = [k for k in range(3) if k != axis]
+        for k, bit in zip(others, bits, strict=True):
+            share *= part[k] if bit else 1 - part[k]
+        for side in (0, 1):
+            corner = [a + (side if k == axis else bits[others.index(k)]) for k, a in enumerate(low)]
+            ends.append(clamped(values, *corner))
+        total[axis] += share * (ends[1] - ends[0])
     return total
 
 
@@ -214,9 +222,10 @@ class Look:
             if transfer.gradient_opacity is not None:
                 at, factors = (column.tolist() for column in transfer.gradient_opacity)
                 found[3] *= piecewise(at, factors, steepness)
-        if scene.lights and (scene.material is None or scene.material.model != "unlit"):
+        material = scene.material or DEFAULT
+        if scene.lights and material.model != "unlit":
             normal = [-g / steepness for g in gradient] if steepness > 0 else [0.0, 0.0, 0.0]
-            found[:3] = lit_color(scene.lights, scene.material, point, normal, viewer, found[:3])
+            found[:3] = lit_color(scene.lights, material, point, normal, viewer, found[:3])
         return found
 
 
