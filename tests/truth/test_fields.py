@@ -155,9 +155,11 @@ def test_images_of_radars_equal_the_scalar_loop(make, beam):
     radar = uneven(3, beam=beam)
     plain = make()
     knots = plain.values * 60 - 10
-    strengths = plain.opacity, None if plain.extinction is None else plain.extinction / 200
+    # Even what has no echo is seen, and what has no data is not.
+    opacity = None if plain.opacity is None else 0.05 + plain.opacity
+    extinction = None if plain.extinction is None else (0.1 + plain.extinction) / 200
     transfer = vr.TransferFunction(
-        knots, plain.colors, opacity=strengths[0], extinction=strengths[1], unit_distance=300.0
+        knots, plain.colors, opacity=opacity, extinction=extinction, unit_distance=300.0
     )
     low, high = (bound.tolist() for bound in radar.box)
     center, size = (radar.box[0] + radar.box[1]) / 2, float(np.linalg.norm(radar.box[1] - radar.box[0]))
@@ -445,6 +447,22 @@ def test_opacities_mixed_of_full_ones_stay_full(classification):
     assert set(np.unique(out.rgba[..., 3])) == {0.0, 1.0}
 
 
+@given(seed=st.integers(0, 2**32 - 1), classification=st.sampled_from(["pre", "per-slice"]))
+def test_no_look_up_before_interpolation_leaves_the_range_of_opacities(seed, classification):
+    # Rounded past 1 an opacity has no logarithm; 0.1, 0.21 and numbers next to 0 and 1 round worst.
+    random = np.random.default_rng(seed)
+    opacity = random.choice([0.0, 2.0**-60, 0.1, 0.21, 1 - 2.0**-53, 1.0], 5)
+    transfer = vr.TransferFunction(np.arange(5.0), [(1, 1, 1)] * 5, opacity=opacity)
+    volume = vr.Volume(random.integers(0, 5, (3, 3, 3)))
+    scene = vr.Scene(volume, transfer, seen_from(volume)[0], WIDTH, HEIGHT, classification=classification)
+    low, high = volume.index_bounds
+    position = random.uniform(low[:, None], high[:, None], (3, 200)) + PAD
+    position[:, ::2] = np.nextafter(np.rint(position[:, ::2]), 0)  # the largest parts there are
+    strength = look_of(scene, position)[1]
+    assert strength.min() >= 0
+    assert strength.max() <= 1
+
+
 @pytest.mark.parametrize("dtype", [np.uint8, np.int16, np.float16, np.float32, np.int64])
 @pytest.mark.parametrize("look", ["sobel", "central", "analytic", "pre", "per-slice"])
 def test_volumes_of_every_type_are_drawn_as_their_numbers_in_float64(dtype, look):
@@ -478,7 +496,7 @@ def test_a_radar_far_from_the_table_of_its_colours_is_drawn_without_a_warning():
     gates[::3, 2] = np.nan
     sweeps = [vr.Sweep(np.arange(36) * 10.0, tilt, gates, 500, 1000) for tilt in (1.0, 10.0)]
     radar = vr.RadarVolume(sweeps, no_echo=1e6)
-    knots = 1e6 + np.array([0.0, 0.5, 0.50001, 1.0])
+    knots = 1e6 + np.array([0.0, 0.5, 0.5001, 1.0])
     transfer = vr.TransferFunction(knots, [(1, 1, 1)] * 4, [0, 0, 1e-3, 1e-3])
     camera = vr.Camera.look_at((0, -20000, 8000), (0, 0, 0), (0, 0, 1), 40.0, 10, 1e5)
     out = march(vr.Scene(radar, transfer, camera, WIDTH, HEIGHT), step=200.0)
@@ -511,9 +529,8 @@ def sphere_error(count, eye, model, gradient):
     out = march(scene, step=spacing**2 / 4)
     errors = []
     for pixel in range(side * side):
-        origin, direction = scalar.look_at_ray(
-            eye, (0, 0, 0), (0, 1, 0.3), 22.0, side, side, *divmod(pixel, side)
-        )
+        x, y = divmod(pixel, side)
+        origin, direction = scalar.look_at_ray(eye, (0, 0, 0), (0, 1, 0.3), 22.0, side, side, x, y)
         along = -lit_ray.dot(origin, direction)
         beside = lit_ray.dot(origin, origin) - along**2
         if beside > 0.8:

@@ -2,6 +2,9 @@
 
 A program that looks its samples up first interpolates colours, and blurs what the transfer function tells
 apart; one that looks up in each slice does so along z only.
+
+Mixing leaves 0..1 nowhere, beyond which an opacity has no logarithm: below + part (above - below) has a part
+that is less than 1 by at least as much as the difference can be too large.
 """
 
 from dataclasses import dataclass
@@ -30,9 +33,6 @@ class PreclassifiedField(Field):
         """Return the interpolated straight colours (3, n) and strength (n,)."""
         position = samples.absolute()
         found = np.stack([trilinear(grid, position.copy(), work).copy() for grid in self.channels])
-        np.maximum(found[3], 0.0, out=found[3])
-        if self.interpolation == "opacity":
-            np.minimum(found[3], 1.0, out=found[3])
         return found[:3], found[3]
 
 
@@ -54,10 +54,6 @@ class SlicedField(Field):
             colors, strength = classify(self.table, trilinear(self.grid, position.copy(), work), work)
             found.append(np.concatenate([colors, strength[None]]))
         mixed = found[0] + share * (found[1] - found[0])
-        # Rounding may leave the range of the two, beyond which an opacity has no logarithm.
-        np.clip(
-            mixed[3], np.minimum(found[0][3], found[1][3]), np.maximum(found[0][3], found[1][3]), mixed[3]
-        )
         return mixed[:3], mixed[3]
 
 
