@@ -2,6 +2,7 @@
 
 import json
 
+import h5py
 import numpy as np
 import pytest
 import trimesh
@@ -93,3 +94,19 @@ def test_an_npy_volume_4_across_with_its_sidecar_is_a_volume(tmp_path):
     assert describe(tmp_path / "v.npy")["size"] == [4, 3, 2]
     (tmp_path / "v.npy.json").unlink()
     assert describe(tmp_path / "v.npy")["kind"] == "image"
+
+
+def test_radars_and_the_transfer_functions_of_other_programs_are_told_apart(tmp_path):
+    radar = describe("tests/data/radar_knmi_denhelder_20110610.npz")
+    assert (radar["kind"], radar["sweeps"], radar["value_range"]) == ("radar", 14, [-31.5, 66.5])
+    presets = describe("tests/data/tf_slicer_presets.json")
+    assert (presets["kind"], presets["program"], len(presets["names"])) == ("transfers", "Slicer", 26)
+    assert "Cool to Warm" in describe("tests/data/tf_paraview_colormaps.json")["names"]
+    with h5py.File(tmp_path / "scan.h5", "w") as file:
+        file.create_group("dataset1")
+    with pytest.raises(FormatError, match=r"scan.h5"):
+        describe_file(tmp_path / "scan.h5")
+    with h5py.File(tmp_path / "box.h5", "w") as file:
+        file["density"] = np.zeros((3, 4, 5))
+        file["density"].attrs["spacing"] = (1.0, 1.0, 1.0)
+    assert describe_file(tmp_path / "box.h5")["kind"] == "volume"

@@ -10,7 +10,7 @@ from volref.errors import FormatError, SceneError
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
-        "files", metavar="FILE", nargs="+", help="a scene, volume, mesh, transfer function or image"
+        "files", metavar="FILE", nargs="+", help="a scene, volume, radar, mesh, transfer function or image"
     )
     add_statements(parser, "a volume file")
     add_limit(parser)

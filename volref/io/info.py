@@ -13,12 +13,13 @@ from volref.io.images import read_image
 from volref.io.meshes import SUFFIXES, load_meshes
 from volref.io.npy import npz_headers, read_npy
 from volref.io.png import read_png_header
+from volref.io.radar.door import holds_radar, load_radar
 from volref.io.readers import is_volume_path
 from volref.io.scene_parts import document_of_placement
 from volref.io.scenes import FORMAT as SCENE_FORMAT
 from volref.io.scenes import load_scene
 from volref.io.transfer import FORMAT as TRANSFER_FORMAT
-from volref.io.transfer import load_transfer
+from volref.io.transfer import load_transfer, names_of_others
 from volref.io.volumes import load_volume
 from volref.scene.mesh import Mesh
 from volref.scene.radar import RadarVolume
@@ -33,9 +34,10 @@ def describe_file(
 ) -> dict[str, Any]:
     """Return what a file holds.
 
-    Its "kind" is "volume", "mesh", "scene", "transfer", "image" or "table" (a lookup table).  `statement` is
-    what `load_volume` needs to be told of the file.  A .npy or .png with such a statement, in the call or in
-    `<name>.json`, is a volume; a .npy (a, b, 4) without is an image.  Everything in the result is JSON.
+    Its "kind" is "volume", "radar", "mesh", "scene", "transfer", "transfers" (another program's, by name),
+    "image" or "table" (a lookup table).  `statement` is what `load_volume` needs to be told of the file.  A
+    .npy or .png with such a statement, in the call or in `<name>.json`, is a volume; a .npy (a, b, 4) without
+    is an image.  Everything in the result is JSON.
 
     Raises
     ------
@@ -52,6 +54,11 @@ def describe_file(
         return about | describe_volume(load_volume(file, max_bytes=max_bytes, **told)) | kept
     if kind == "mesh":
         return about | {"meshes": [describe_mesh(mesh) for mesh in load_meshes(file, max_bytes=max_bytes)]}
+    if kind == "radar":
+        return about | describe_volume(load_radar(file, max_bytes=max_bytes))
+    if kind == "transfers":
+        program, names = names_of_others(read_json(file)) or ("", [])
+        return about | {"program": program, "names": names}
     if kind == "scene":
         return about | describe_scene(load_scene(file, max_bytes=max_bytes))
     if kind == "transfer":
@@ -149,6 +156,8 @@ def _kind_of(file: Path, max_bytes: int) -> str:
         return _kind_of_json(file)
     if suffix in SUFFIXES:
         return "mesh"
+    if suffix not in (".npy", ".png", ".exr", ".raw", ".bin") and holds_radar(file):
+        return "radar"
     if suffix == ".npy":
         return _kind_of_shape(read_npy(file, max_bytes).shape)
     if suffix == ".npz":
@@ -168,6 +177,8 @@ def _kind_of_json(file: Path) -> str:
     document = read_json(file)
     if isinstance(document, dict) and document.get("format") == TRANSFER_FORMAT:
         return "transfer"
+    if names_of_others(document) is not None:
+        return "transfers"
     check_format(file, document, SCENE_FORMAT)
     return "scene"
 

@@ -182,6 +182,23 @@ def save_transfer(transfer: AnyTransfer, path: str | Path, *, overwrite: bool = 
     write_text(file, json.dumps(document, indent=1, allow_nan=False) + "\n", overwrite=overwrite)
 
 
+def names_of_others(document: Foreign) -> tuple[str, list[str]] | None:
+    """Return whose transfer functions a JSON document holds and their names; None if they are volref's own.
+
+    Examples
+    --------
+    >>> names_of_others([{"Name": "Cool", "RGBPoints": []}, {"Name": "Warm", "RGBPoints": []}])
+    ('ParaView', ['Cool', 'Warm'])
+    """
+    kind = _kind_of(document)
+    if kind == "volref":
+        return None
+    entries = document if isinstance(document, list) and kind != "VPT" else [document]
+    entries = [entry for entry in entries if isinstance(entry, dict)]
+    names = [entry.get("Name", entry.get("name")) for entry in entries]
+    return kind, [str(name) for name in names if name is not None]
+
+
 def _kind_of(document: Foreign) -> str:
     """Return whose JSON this is; what nobody else writes is for volref's own rules to refuse."""
     first = document[0] if isinstance(document, list) and document else document

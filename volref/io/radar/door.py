@@ -1,5 +1,6 @@
 """Radars from files: one door, by what a file holds."""
 
+from importlib.util import find_spec
 from pathlib import Path
 
 from numpy.typing import ArrayLike
@@ -7,6 +8,7 @@ from numpy.typing import ArrayLike
 from volref.arrays import one_of, whole_number
 from volref.errors import FormatError
 from volref.io.guard import existing_file, extra, one_line, wrapped
+from volref.io.npy import npz_headers
 from volref.io.radar.contents import RADAR_MAX_BYTES, Contents, Wish
 from volref.io.radar.npz import read_radar_npz, write_radar_npz
 from volref.io.radar.odim import read_odim
@@ -93,6 +95,28 @@ def load_radar(
     stated = {"no_echo": no_echo, "beam": beam, "origin": origin}
     stated = {key: value for key, value in stated.items() if value is not None}
     return RadarVolume(contents.sweeps, **{**contents.said, **stated})
+
+
+def holds_radar(path: str | Path) -> bool:
+    """Tell by its beginning, and of .npz and HDF5 by the names inside, whether a file is a radar's.
+
+    HDF5 needs the extra `hdf5`; without it nothing is.
+
+    Raises
+    ------
+    FormatError
+        If the file cannot be read.
+    """
+    file = existing_file(path)
+    with wrapped(file, "file"), file.open("rb") as stream:
+        head = stream.read(8)
+    kind = next((kind for signature, kind in SIGNATURES if head.startswith(signature)), None)
+    if kind == "npz":
+        names = set(npz_headers(file))
+        return "n_sweeps" in names or any(name.startswith("codes") for name in names)
+    if kind == "hdf5":
+        return find_spec("h5py") is not None and _kind_of_hdf5(file) != "cfradial1"
+    return kind is not None
 
 
 def _read(file: Path, kind: str, wish: Wish) -> Contents:
