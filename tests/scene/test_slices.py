@@ -127,14 +127,15 @@ def exact_slice(scene):
 
 
 @settings(max_examples=15)
-@given(st.integers(0, 10_000), st.booleans())
-def test_an_oblique_slice_is_within_its_bound_of_the_exact_value(seed, perspective):
+@given(st.integers(0, 10_000), st.sampled_from([None, 9.0, 1e6]))
+def test_an_oblique_slice_is_within_its_bound_of_the_exact_value(seed, away):
     rng = np.random.default_rng(seed)
     volume = rough_volume(seed)
     point, normal, up = rng.random(3) * 4 + 0.5, rng.normal(size=3), rng.normal(size=3)
     scene = oblique_slice(volume, TABLE, point, normal, up, 9, 7, 0.8, background=BEHIND)
-    if perspective:
-        camera = Camera.look_at(point + 9 * normal + up, point, up, 40.0, 0.1, 99.0)
+    if away is not None:
+        fov_y = float(np.degrees(6 / away))
+        camera = Camera.look_at(point + away * normal + up, point, up, fov_y, 0.1, 10 * away)
         words = {"background": BEHIND, "mode": "slice", "slice_plane": scene.slice_plane}
         scene = Scene(volume, TABLE, camera, 9, 7, **words)
     rgba, bound = drawn(scene)
@@ -142,7 +143,8 @@ def test_an_oblique_slice_is_within_its_bound_of_the_exact_value(seed, perspecti
     error = np.abs(rgba.reshape(-1, 4) - truth).max(axis=1)
     # The truth is rounded to float64 and classified there: a few ulp, slopes of the table up to 2.
     assert (error <= bound.reshape(-1) + 8 * 2.0**-53).all()
-    assert np.median(bound) < 1e-12
+    # From a million away positions have ten digits.
+    assert np.median(bound) < (1e-7 if away == 1e6 else 1e-11)
 
 
 def test_an_oblique_slice_looks_against_its_normal_with_up_upwards():

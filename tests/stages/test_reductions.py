@@ -1,5 +1,7 @@
 """Extremes and means of pieces of rays, and of samples, against scalar loops."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -50,7 +52,7 @@ def test_the_greatest_value_along_a_ray_is_that_of_its_pieces(seed):
     for ray in range(6):
         its = pieces.ray == ray
         assert found.value[ray] == (here[its].max() if its.any() else -20.0)
-        assert found.least[ray] <= found.value[ray] <= found.most[ray]
+        assert found.least[ray] <= found.value[ray] <= found.most[ray] - 1e-9
         # Off by the slack, the rounding of values of a few units, and what may lie in the next cell.
         assert found.most[ray] - found.least[ray] <= 2e-9 + 1e-12
 
@@ -89,6 +91,18 @@ def test_the_mean_of_a_constant_is_that_constant_exactly_and_certainly():
     pieces = Pieces(ray, np.linspace(0.1, 0.9, 7), cubic, np.zeros(7), np.zeros(7), ray, np.zeros(7))
     found = mean_along(pieces, np.zeros(1))
     assert (found.value[0], found.least[0], found.most[0]) == (0.1, 0.1, 0.1)
+
+
+def test_the_mean_is_off_by_what_lies_in_the_next_cell_and_by_the_slack_of_its_pieces():
+    pieces = pieces_of(3)
+    slack = dataclasses.replace(pieces, slack=pieces.slack + 0.25)
+    some = np.unique(pieces.ray)
+    close, next_cell, loose = (
+        mean_along(what, np.full(6, off)).most[some]
+        for what, off in ((pieces, 0.0), (pieces, 0.5), (slack, 0.0))
+    )
+    np.testing.assert_allclose(next_cell - close, 0.5, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(loose - close, 0.25, rtol=0, atol=1e-12)
 
 
 def test_samples_reduce_as_their_segments_say():

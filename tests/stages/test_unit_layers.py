@@ -62,6 +62,12 @@ def test_the_bound_is_the_change_where_only_opacity_or_colour_changes():
     assert layer(color, 0.5, 0.5, 0.75)[1] == pytest.approx(0.25, rel=1e-12)
 
 
+def test_a_knot_between_the_ends_of_the_range_counts():
+    peak = TransferFunction([0, 0.5, 1], [(1, 1, 1)] * 3, opacity=[0, 1, 0])
+    assert layer(peak, 0.4, 0.2, 0.8)[1] == pytest.approx(0.4 * 0.9, rel=1e-12)  # to 0; to 1 it is 0.2
+    assert layer(peak, 0.3, 0.2, 0.8)[1] == pytest.approx(0.4 * 0.9, rel=1e-12)  # up to the peak
+
+
 def test_many_values_are_as_one_by_one():
     transfer = TransferFunction([0.0, 0.5, 0.5, 1.0], np.eye(4)[:, :3], [0.0, 1.0, 3.0, 0.5])
     values = np.linspace(-0.1, 1.1, 25)

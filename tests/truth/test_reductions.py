@@ -150,6 +150,35 @@ def test_thousands_of_them_are(case):
     assert_case_is_certified(case)
 
 
+def assert_rays_are_certified(volume, origins, directions, isovalue):
+    transfer = opacity_of(*volume.value_bounds)
+    rays = list(zip(origins.tolist(), directions.tolist(), strict=True))
+    for mode in (*MODES, "isosurface"):
+        words = {"isovalue": isovalue} if mode == "isosurface" else {}
+        out = shot(volume, transfer, mode, origins, directions, **words)
+        assert_certified(out, volume, transfer, mode, rays, **words)
+
+
+def test_rays_that_touch_an_edge_of_the_box_may_or_may_not_have_a_span():
+    rng = np.random.default_rng(0)
+    z, _, x = np.mgrid[:3, :3, :3].astype(float)
+    # At the edge x = 0, z = 2 the value is 0, and forwards and upwards there is no room behind it.
+    directions = np.stack([rng.random(200) + 0.1, rng.normal(size=200), rng.random(200) + 0.1], axis=1)
+    edge = np.stack([np.zeros(200), rng.random(200) * 2, np.full(200, 2.0)], axis=1)
+    origins = edge - np.where(rng.random(200) < 0.5, 3.0, 700.0)[:, None] * directions
+    assert_rays_are_certified(Volume(x - (2 - z), centering="node"), origins, directions, 0.0)
+
+
+def test_where_a_ray_leaves_by_a_face_that_it_hardly_moves_towards_is_known_to_few_digits():
+    rng = np.random.default_rng(1)
+    directions = rng.normal(size=(150, 3)) * [1.0, 1e-9, 0.3]
+    exits = np.stack([rng.random(150) + 1, np.full(150, 3.5), rng.random(150) + 1], axis=1)
+    directions[:, 1] = np.abs(directions[:, 1])
+    origins = exits - 1.5 * directions
+    volume = rough_volume(8, shape=(4, 4, 4))
+    assert_rays_are_certified(volume, origins, directions, float(volume.values[1, 3, 1]))
+
+
 def opacity_of(low, high):
     """A table whose opacity is the value, from 0 at `low` to 1 at `high`: an image then shows values."""
     return TransferFunction([low, high], [(1, 1, 1)] * 2, opacity=[0, 1])
@@ -183,6 +212,18 @@ def rays_into(volume, count, seed=0):
     directions = rng.normal(size=(count, 3))
     directions /= np.linalg.norm(directions, axis=1)[:, None]
     return targets - 40 * directions, directions
+
+
+def test_extremes_are_within_4_ulp_of_the_true_ones():
+    volume = rough_volume(3, shape=(32,) * 3)
+    origins, directions = rays_into(volume, 25)
+    ulp = np.spacing(volume.value_bounds[1])
+    for mode in EXTREMES:
+        found = values_of(volume, mode, origins, directions)
+        with mp.workdps(DIGITS):
+            for value, origin, direction in zip(found, origins.tolist(), directions.tolist(), strict=True):
+                # 2 ulp more: the value is read off an opacity.
+                assert abs(value - reduced_value(mp, mode, volume, origin, direction)) <= 6 * ulp
 
 
 @pytest.mark.parametrize("size", [5, 24])
