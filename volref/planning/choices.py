@@ -12,6 +12,7 @@ from volref.scene.blocks import flag_blocks
 from volref.scene.footprint import footprint
 from volref.scene.palette import FULL_PALETTE, Palette, palette_of
 from volref.scene.radar import RadarVolume
+from volref.scene.radar_blocks import flag_radar
 from volref.scene.rounding import float32_error
 from volref.scene.scene import Scene
 from volref.scene.transfer import TransferFunction
@@ -238,9 +239,10 @@ def diagonal_of(scene: Scene) -> float:
 def empty_space(scene: Scene, block: float) -> tuple[Occupancy | None, Stage]:
     """Mark the cells that have something visible within half the length of a block of segments, `block`."""
     volume = scene.volume
-    if not isinstance(volume, Volume):
-        return None, Stage("empty space", included=False, reason="a radar volume has no blocks of cells")
     half = block / 2 * (1 + REACH_MARGIN)
+    if isinstance(volume, RadarVolume):
+        return _empty_air(scene, volume, half)
+    assert volume is not None
     # A unit step in the world moves at most this many indices along each axis.
     indices_per_length = np.linalg.norm(volume.index_from_world[:3, :3], axis=1)
     x, y, z = (math.ceil(half * count + ROUNDED_INDEX) for count in indices_per_length)
@@ -255,9 +257,31 @@ def empty_space(scene: Scene, block: float) -> tuple[Occupancy | None, Stage]:
     # One index more than the reach: a "cell" volume begins half an index before its first block.
     layers = (1 + x // BLOCK, 1 + y // BLOCK, 1 + z // BLOCK)
     blocks = np.pad(occupied, [(layers[axis], layers[axis]) for axis in (2, 1, 0)], mode="edge")
-    return Occupancy(blocks, layers, half), Stage(
+    low = (-float(BLOCK * layers[0]), -float(BLOCK * layers[1]), -float(BLOCK * layers[2]))
+    return Occupancy(blocks, low, (float(BLOCK),) * 3, half), Stage(
         name, included=True, reason=reason, saves="the samples there"
     )
+
+
+def _empty_air(scene: Scene, radar: RadarVolume, half: float) -> tuple[Occupancy | None, Stage]:
+    """Mark the blocks of the world that have something visible of a radar within `half`."""
+    name = "empty space"
+    if scene.mode != "composite":
+        return None, Stage(name, included=False, reason=f"mode {scene.mode!r} takes all samples of a radar")
+    if 2 * half > diagonal_of(scene) / 2:
+        return None, Stage(
+            name, included=False, reason="one block of segments is longer than the radar's box"
+        )
+    blocks = flag_radar(radar, half, partial(may_be_seen, scene.envelope))
+    empty = 1 - float(blocks.seen.mean())
+    x, y, z = blocks.size
+    reason = (
+        f"{empty:.0%} of the blocks of {x:.3g} x {y:.3g} x {z:.3g} are transparent with their surroundings"
+    )
+    if empty < LEAST_EMPTY_PART:
+        return None, Stage(name, included=False, reason=f"{reason}: looking for them would cost more")
+    found = Occupancy(blocks.seen, blocks.low, blocks.size, half)
+    return found, Stage(name, included=True, reason=reason, saves="the samples there")
 
 
 def may_be_seen(transfer: TransferFunction, low: Floats, high: Floats) -> Booleans:

@@ -4,7 +4,7 @@ import dataclasses
 from dataclasses import dataclass, field
 from typing import Any
 
-from volref.arrays import Booleans, Floats
+from volref.arrays import Booleans, Floats, Vector
 from volref.errors import SceneError
 from volref.scene.palette import FULL_PALETTE, Palette
 from volref.scene.scene import Scene
@@ -28,14 +28,16 @@ class Stage:
 
 @dataclass(frozen=True, eq=False)
 class Occupancy:
-    """Where something can be seen: blocks of `BLOCK`^3 cells (bz, by, bx), with layers of blocks around.
+    """Where something can be seen: blocks (bz, by, bx) of the space of the field, with layers around it.
 
-    A block counts as occupied if anything within `reach` world units of it is visible.  Index point p lies
-    in block floor(p / BLOCK) + `layers` (x, y, z); the layers hold every point within `reach` of the volume.
+    A block counts as occupied if anything within `reach` world units of it is visible.  Point p lies in
+    block floor((p - low) / size), `low` and `size` being x, y, z; the blocks hold every point within `reach`
+    of a volume on a grid, and every point of a radar's box.
     """
 
     blocks: Booleans
-    layers: tuple[int, int, int]
+    low: Vector
+    size: Vector
     reach: float
 
 

@@ -6,7 +6,7 @@ R rays, b blocks of the ray that has most of them.
 import numpy as np
 
 from volref.arrays import Booleans, Floats, Indices
-from volref.planning import BLOCK, Occupancy, Plan
+from volref.planning import Occupancy, Plan
 from volref.stages.sampling import PAD
 
 
@@ -53,13 +53,15 @@ def _falling(counts: Indices) -> Indices:
 def _seen(occupancy: Occupancy, start: Floats, stride: Floats, blocks: Indices) -> Booleans:
     """Tell of each block of each ray, `stride` (3, R) apart, whether anything can be seen in it, (most, R).
 
-    The block of cells around the middle of its segments answers for all of them: they lie within its reach.
+    The block around the middle of its segments answers for all of them: they lie within its reach.
     """
     most, count = int(blocks.max(initial=0)), len(blocks)
     # The occupancy reaches far enough for the rounding of float32 where blocks are few along each axis.
     kind = np.dtype(np.float32 if max(occupancy.blocks.shape) < 2**10 else np.float64)
-    begin = ((start - PAD) / BLOCK + np.array(occupancy.layers)[:, None]).astype(kind)
-    along = (stride / BLOCK).astype(kind)
+    low, size = (np.array(vector)[:, None] for vector in (occupancy.low, occupancy.size))
+    # A ray that has no blocks may start anywhere.
+    begin = (np.where(blocks > 0, start - PAD - low, 0.0) / size).astype(kind)
+    along = (stride / size).astype(kind)
     seen = np.empty((most, count), np.bool_)
     flags = occupancy.blocks.reshape(-1)
     flat, whole, place = np.empty(count, np.int32), np.empty(count, np.int32), np.empty(count, kind)
