@@ -309,7 +309,7 @@ def test_the_isosurface_of_a_sphere_lies_within_1e_12_of_the_trilinear_root():
             near, far = (near, middle) if above(middle) < 0 else (middle, far)
         hits += 1
         assert abs(out.hit[k] - float(far)) <= 1e-12
-        assert out.off[k] <= 1e-11
+        assert out.off[k] <= 1e-10  # which allows for slopes along the ray down to 0.01
         assert out.bound[k] < 1e-14
     assert hits > 20
 

@@ -95,7 +95,6 @@ class _Ways:
     rests: Floats
     directions: Floats
     spans: Spans
-    ends: Spans
     middle: Floats
     error: Floats
     off: Floats
@@ -109,7 +108,6 @@ class _Ways:
             self.rests[:, chosen],
             self.directions[:, chosen],
             Spans(self.spans.t_near[chosen], self.spans.t_far[chosen]),
-            Spans(self.ends.t_near[chosen], self.ends.t_far[chosen]),
             self.middle[chosen],
             self.error[chosen],
             self.off[chosen],
@@ -225,7 +223,8 @@ def _ways(
 
     With e the error of positions and s the steepest difference of neighbouring samples, each index along an
     axis changes the value by at most s: a ray that is in the next cell by 2 e along each axis is off by
-    6 s e, and one whose span is longer or shorter by h at an end by h s (|dx| + |dy| + |dz|).
+    6 s e.  Where the ends are misplaced by h in all, extremes lie at most h away, and so do means, whose
+    interval is longer or shorter by h, at most 2 h: they are off by 2 h s (|dx| + |dy| + |dz|).
     """
     grid = prepared.grid
     known = cut_spans(box_spans(origins, directions, prepared.low, prepared.high), begin, distance)
@@ -236,13 +235,13 @@ def _ways(
     middle = np.where(
         inside, 0.5 * (np.where(inside, known.t_near, 0) + np.where(inside, known.t_far, 0)), 0.0
     )
-    longest = np.maximum(ends.t_near, ends.t_far)
+    misplaced = ends.t_near + ends.t_far
     error = position_error(grid, moved, directions, spans)
-    off = grid.steepest * (6 * error + longest * np.abs(directions).sum(axis=0))
+    off = grid.steepest * (6 * error + 2 * misplaced * np.abs(directions).sum(axis=0))
     inside &= spans.t_far > spans.t_near
-    touching = ~inside & (ends.t_near + ends.t_far > 0)
-    doubtful = inside & (spans.t_far - spans.t_near <= ends.t_near + ends.t_far)
-    return _Ways(moved, rests, directions, spans, ends, middle, error, off, touching, doubtful)
+    touching = ~inside & (misplaced > 0)
+    doubtful = inside & (spans.t_far - spans.t_near <= misplaced)
+    return _Ways(moved, rests, directions, spans, middle, error, off, touching, doubtful)
 
 
 def _over(transfer: TransferFunction, found: Estimates, ways: _Ways, behind: Floats) -> tuple[Floats, Floats]:
@@ -306,17 +305,11 @@ def _sampled(sign: float, prepared: Reducible, ways: _Ways) -> Floats:
 
 
 def _mean(prepared: Reducible, ways: _Ways, *, precise: bool) -> tuple[Estimates, int]:
-    """Return the mean value along rays, and how many pieces it took.
-
-    An end that is misplaced by h changes the mean by at most h / length of all that values can differ.
-    """
+    """Return the mean value along rays, and how many pieces it took."""
     pieces, _ = placed_cells(
         prepared.grid, ways.origins, ways.rests, ways.directions, ways.spans, precise=precise
     )
-    length = ways.spans.t_far - ways.spans.t_near
-    with np.errstate(divide="ignore", invalid="ignore"):
-        share = np.where(length > 0, (ways.ends.t_near + ways.ends.t_far) / length, 0.0)
-    found = mean_along(pieces, ways.off + prepared.grid.steepest * share)
+    found = mean_along(pieces, ways.off)
     # A ray that only touches the box may see the value there.
     at = np.flatnonzero(ways.touching)
     found.value[at] = _values_at(prepared, ways, ways.spans.t_near)[at]
