@@ -95,7 +95,7 @@ def _meet(t: Floats, ray: Indices, cubic: Floats, middle: Floats, length: Floats
 def crossing_of_samples(values: Floats, t: Floats, isovalue: float) -> Floats:
     """Return where values (S, R) at t (S, R), straight between them, first meet `isovalue`; +inf: nowhere.
 
-    For volumes whose value is known at points only.
+    For volumes whose value is known at points only.  Nothing is met next to a sample that is NaN.
 
     Examples
     --------
@@ -106,6 +106,7 @@ def crossing_of_samples(values: Floats, t: Floats, isovalue: float) -> Floats:
     above = values - isovalue
     meets = np.signbit(above[1:]) != np.signbit(above[:-1])
     meets |= above[1:] == 0
+    meets &= ~(np.isnan(above[1:]) | np.isnan(above[:-1]))
     rays = np.arange(values.shape[1])
     first = meets.argmax(axis=0)
     before, after = above[first, rays], above[first + 1, rays]

@@ -1,19 +1,21 @@
 """The modes that reduce a ray to one value, for a volume that is no grid of cells: by samples.
 
-R rays, S samples of each, at the middles of equal segments of its span.  What every third sample says instead
-is the estimate of the error, as for a march.
+R rays, S samples of each, at the middles of equal segments of its span; NaN where nothing was measured.  What
+every third sample says instead is the estimate of the error, as for a march.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from volref.arrays import Booleans, Floats, Indices
+from volref.arrays import Floats, Indices
 from volref.planning import Plan
 from volref.records import Rays, Spans
 from volref.scene.scene import Scene
+from volref.stages.isosurface import crossing_of_samples
 from volref.stages.polar import polar_lookup
 from volref.stages.rays import pixel_rays
+from volref.stages.reductions import reduced_samples
 from volref.stages.spans import box_spans, cut_spans
 from volref.stages.unit_layers import straight_colors, unit_layers
 from volref.truth.fields.polar import PolarField
@@ -21,14 +23,8 @@ from volref.truth.fields.polar import PolarField
 # The estimate compares with every third sample.
 EVERY = 3
 
-
-@dataclass(eq=False)
-class _Found:
-    """What has been found along rays: value (R,), whether anything was measured (R,), and where (R,)."""
-
-    value: Floats
-    measured: Booleans
-    at: Floats
+# Samples that are held at a time.
+SAMPLES = 1 << 20
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,80 +56,41 @@ def sample_pixels(
     inside = np.flatnonzero(length > 0)
     count = EVERY * max(int(np.ceil(length.max(initial=0.0) / (EVERY * plan.step))), 1)
     rgba, bound, hit = behind.copy(), np.zeros(len(pixels)), np.full(len(pixels), np.inf)
-    its = Rays(rays.origins[inside], rays.directions[inside])
-    stride, start = length[inside] / count, spans.t_near[inside]
-    fine, coarse = _along(scene, field, its, start, stride, count)
-    shown = [_shown(scene, found, behind[inside]) for found in (fine, coarse)]
-    rgba[inside] = shown[0]
-    bound[inside] = np.abs(shown[0] - shown[1]).max(axis=1)
-    if scene.mode == "isosurface":
-        hit[inside] = np.where(fine.measured, fine.at, np.inf)
+    for part in np.array_split(inside, 1 + len(inside) * count // SAMPLES):
+        t = spans.t_near[part] + (np.arange(count) + 0.5)[:, None] * (length[part] / count)
+        its = Rays(rays.origins[part], rays.directions[part])
+        values = _values(field, its, t)
+        middle = slice(EVERY // 2, None, EVERY)
+        rgba[part], hit[part] = _shown(scene, values, t, behind[part])
+        coarse, _ = _shown(scene, values[middle], t[middle], behind[part])
+        bound[part] = np.abs(rgba[part] - coarse).max(axis=1)
     return Sampled(rgba, bound, hit, count * len(inside))
 
 
-def _along(
-    scene: Scene, field: PolarField, rays: Rays, start: Floats, stride: Floats, count: int
-) -> tuple[_Found, _Found]:
-    """Return what all samples say, and what every third one, the middle one of three, says."""
-    rays_count = len(start)
-    initial = {"mip": -np.inf, "minip": np.inf}.get(scene.mode, 0.0)
-    both = [
-        _Found(np.full(rays_count, initial), np.zeros(rays_count, np.bool_), np.full(rays_count, np.inf))
-        for _ in range(2)
-    ]
-    seen = [np.zeros(rays_count), np.zeros(rays_count)]
-    before = [np.full(rays_count, np.nan), np.full(rays_count, np.nan)]
-    for k in range(count):
-        t = start + (k + 0.5) * stride
-        values, measured = polar_lookup(field.gates, (rays.origins + t[:, None] * rays.directions).T)
-        for which, apart in ((0, 1), (1, EVERY)):
-            if which and k % EVERY != EVERY // 2:
-                continue
-            found = both[which]
-            if scene.mode == "isosurface":
-                assert scene.isovalue is not None
-                last, before[which] = before[which], np.where(measured, values, np.nan)
-                _cross(found, scene.isovalue, last, before[which], t, apart * stride)
-                continue
-            seen[which] += measured
-            found.measured |= measured
-            _gather(scene.mode, found.value, values, measured)
-    if scene.mode == "average":
-        for found, many in zip(both, seen, strict=True):
-            found.value /= np.maximum(many, 1.0)
-    return both[0], both[1]
+def _values(field: PolarField, rays: Rays, t: Floats) -> Floats:
+    """Return the values (S, R) at t (S, R) along rays, NaN where nothing was measured."""
+    points = rays.origins + t[..., None] * rays.directions
+    values, measured = polar_lookup(field.gates, points.reshape(-1, 3).T)
+    return np.where(measured, values, np.nan).reshape(t.shape)
 
 
-def _gather(mode: str, value: Floats, values: Floats, measured: Booleans) -> None:
-    """Take a sample of each ray into `value` (R,), in place."""
-    if mode == "average":
-        value += np.where(measured, values, 0.0)
-    elif mode == "mip":
-        np.maximum(value, values, out=value, where=measured)
-    else:
-        np.minimum(value, values, out=value, where=measured)
-
-
-def _cross(found: _Found, isovalue: float, last: Floats, values: Floats, t: Floats, apart: Floats) -> None:
-    """Take the first crossing of the isovalue between neighbouring samples, linear between them."""
-    with np.errstate(invalid="ignore"):
-        crosses = ((last < isovalue) != (values < isovalue)) & ~np.isnan(last) & ~np.isnan(values)
-    new = np.flatnonzero(crosses & ~found.measured)
-    share = (isovalue - last[new]) / (values[new] - last[new])
-    found.at[new] = t[new] - (1.0 - share) * apart[new]
-    found.measured[new] = True
-
-
-def _shown(scene: Scene, found: _Found, behind: Floats) -> Floats:
-    """Return the rgba (R, 4) of what was found, and what lies behind where nothing was."""
-    _, transfer = scene.volume, scene.envelope
+def _shown(scene: Scene, values: Floats, t: Floats, behind: Floats) -> tuple[Floats, Floats]:
+    """Return the rgba (R, 4) of what samples (S, R) say, what lies behind if nothing, and hits (R,)."""
     if scene.mode == "isosurface":
         assert scene.isovalue is not None
-        color, _ = straight_colors(transfer, np.array([scene.isovalue]))
-        return np.where(found.measured[:, None], np.append(color, 1.0), behind)
-    value = np.where(found.measured, found.value, 0.0)
-    rgba, _ = unit_layers(transfer, value, value, value, behind)
-    return np.where(found.measured[:, None], rgba, behind)
+        hit = crossing_of_samples(values, t, scene.isovalue)
+        color, _ = straight_colors(scene.envelope, np.array([scene.isovalue]))
+        return np.where(np.isfinite(hit)[:, None], np.append(color, 1.0), behind), hit
+    measured = ~np.isnan(values)
+    found = reduced_samples(scene.mode, np.where(measured, values, 0.0), measured.astype(np.float64))
+    return _layered(scene, found, behind), np.full(len(found), np.inf)
+
+
+def _layered(scene: Scene, found: Floats, behind: Floats) -> Floats:
+    """Return the layers (R, 4) of values (R,) over what lies behind, and that where a value is NaN."""
+    value = np.nan_to_num(found)
+    rgba, _ = unit_layers(scene.envelope, value, value, value, behind)
+    return np.where(np.isnan(found)[:, None], behind, rgba)
 
 
 def _sliced(scene: Scene, field: PolarField, rays: Rays, spans: Spans, behind: Floats) -> Sampled:
@@ -145,10 +102,8 @@ def _sliced(scene: Scene, field: PolarField, rays: Rays, spans: Spans, behind: F
     with np.errstate(divide="ignore", invalid="ignore"):
         t = -plane.height(rays.origins) / rise
     meets = np.flatnonzero((rise != 0) & (t >= spans.t_near) & (t <= spans.t_far))
-    points = rays.origins[meets] + t[meets, None] * rays.directions[meets]
-    values, measured = polar_lookup(field.gates, points.T)
+    values = _values(field, Rays(rays.origins[meets], rays.directions[meets]), t[None, meets])
     rgba = behind.copy()
-    found = _Found(np.where(measured, values, 0.0), measured, t[meets])
-    rgba[meets] = _shown(scene, found, behind[meets])
+    rgba[meets] = _layered(scene, values[0], behind[meets])
     none = np.zeros(len(behind))
     return Sampled(rgba, none, np.full(len(behind), np.inf), len(meets))
