@@ -1,0 +1,1 @@
+"""Draws the contact sheets of docs/gallery.md: `python -m data_gen.gallery`."""
