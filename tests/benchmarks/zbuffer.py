@@ -13,8 +13,8 @@ from tests.oracles.meshes import bumpy_sphere
 from volref.scene.camera import Camera
 from volref.scene.scene import Scene
 from volref.stages.clipping import project
-from volref.truth.surfaces import visible_surface
-from volref.truth.triangles import nearest_faces, triangles_of
+from volref.truth.meshes.surfaces import visible_surface
+from volref.truth.meshes.triangles import nearest_faces, triangles_of
 
 WIDTH = HEIGHT = 512
 

@@ -2,7 +2,7 @@
 
 Others live beside the stage they belong to: weights and the last transmittance add up to one, splitting a
 segment changes nothing, over is associative (tests/stages/test_composite.py); triangle order is irrelevant
-(tests/truth/test_surfaces.py); skipping changes nothing (tests/truth/test_march.py).
+(tests/truth/meshes/test_surfaces.py); skipping changes nothing (tests/truth/test_march.py).
 """
 
 import dataclasses

@@ -14,7 +14,7 @@ from volref.errors import FormatError, SceneError
 from volref.image import decode_rgba8, encode_rgba8
 from volref.report.demo import DATA, FILES, REPEAT_PYTHON, demo_scene, run_demo
 from volref.report.pictures import NEUTRAL
-from volref.truth.surfaces import visible_surface
+from volref.truth.meshes.surfaces import visible_surface
 
 SIDE = 48
 

@@ -13,7 +13,7 @@ from volref import Camera, Plane, Scene, SceneError, TransferFunction, Volume
 from volref.scene.slices import axis_slice, oblique_slice
 from volref.stages.rays import pixel_rays
 from volref.truth.digits.lattice import corner_samples, exact_point
-from volref.truth.reductions import prepare_reduction, reduce_pixels
+from volref.truth.modes.reductions import prepare_reduction, reduce_pixels
 
 COLORS = [(0.2, 0.0, 1.0), (1.0, 0.6, 0.1), (0.9, 0.9, 0.3)]
 TABLE = TransferFunction([0.0, 0.4, 1.0], COLORS, opacity=[0.1, 0.9, 0.5])

@@ -229,6 +229,10 @@ def from_behind_the_eye(origins, directions, low, high):
 spans_as_they_are = spans.box_spans
 
 
+def cut_behind_the_eye(ranges, _begin, end):
+    return Spans(np.where(ranges.t_near == 0, -1.0, ranges.t_near), np.minimum(ranges.t_far, end))
+
+
 def lookup_not_held(table, values, work):
     entry = classify._entries(table, values, work)
     found = table.base[:, entry] + table.slope[:, entry] * (values - table.start[entry])
@@ -346,7 +350,8 @@ BREAKS = [
     (classify.segment_opacity, opacity_as_a_product, ["long-steps", "extinction-1e300"]),
     (spans.box_spans, products_by_the_inverse(np.minimum, np.maximum), ["ray-in-a-face", "rays-in-faces"]),
     (spans.box_spans, products_by_the_inverse(np.fmin, np.fmax), ["ray-in-a-face", "direction-1e-310"]),
-    (spans.box_spans, from_behind_the_eye, ["camera-inside", "camera-on-a-face"]),
+    (spans.box_spans, from_behind_the_eye, ["camera-inside"]),
+    (spans.cut_spans, cut_behind_the_eye, ["camera-on-a-face"]),
     (spans.cut_spans, surface_ignored, ["zero-length-span", "camera-inside-a-mesh"]),
     (classify.classify, lookup_not_held, ["opacity-rounded-above-1", "extinction-rounded-below-0"]),
     (sampling.trilinear, trilinear_in_float32, ["uint32-extremes", "denormal-values"]),

@@ -14,8 +14,8 @@ from volref.phantoms.meshes import sphere_mesh
 from volref.scene.footprint import Rectangle
 from volref.truth.canvas import Canvas, light_behind
 from volref.truth.integration import Integrated, worker
+from volref.truth.meshes.surfaces import visible_surface
 from volref.truth.parts import cut, runs, tiles
-from volref.truth.surfaces import visible_surface
 
 BACKGROUND = (0.1, 0.2, 0.3, 0.5)
 

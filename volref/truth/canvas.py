@@ -12,8 +12,8 @@ from volref.scene.lights import Material
 from volref.scene.scene import Scene
 from volref.stages.lighting import brightest_lit
 from volref.truth.integration import Integrated, Integration
-from volref.truth.layered import integrate_layered
-from volref.truth.layers import visible_layers
+from volref.truth.meshes.layered import integrate_layered
+from volref.truth.meshes.layers import visible_layers
 from volref.truth.parts import Parts, runs
 
 # Pixels that are filled with what lies behind the volume, or with what it could be, at a time.

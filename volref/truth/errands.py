@@ -23,7 +23,7 @@ from volref.scene.scene import Scene
 from volref.scene.volume import Volume
 from volref.truth.canvas import light_behind
 from volref.truth.integration import Integrated, Integration
-from volref.truth.layered import integrate_layered
+from volref.truth.meshes.layered import integrate_layered
 
 
 @dataclass(frozen=True)

@@ -20,9 +20,9 @@ from volref.truth.exact import Prepared, integrate_pixels, prepare
 from volref.truth.fields import Field, field_of
 from volref.truth.fields.polar import PolarField
 from volref.truth.march import march_chunk
-from volref.truth.reductions import Reducible, prepare_reduction, reduce_pixels
-from volref.truth.sampled import sample_pixels
-from volref.truth.shading import LitSurface
+from volref.truth.modes.reductions import Reducible, prepare_reduction, reduce_pixels
+from volref.truth.modes.sampled import sample_pixels
+from volref.truth.modes.shading import LitSurface
 from volref.workspace import Workspace
 
 

@@ -17,9 +17,9 @@ from volref.truth.choosing import Choice, around_each, choose
 from volref.truth.crew import Crew, Progress, available_cores
 from volref.truth.estimating import march_to_tolerance
 from volref.truth.integration import Integration
+from volref.truth.meshes.surfaces import visible_surface
 from volref.truth.parts import TILE_HEIGHT, TILE_WIDTH, cut, tiles
 from volref.truth.result import Render
-from volref.truth.surfaces import visible_surface
 
 
 def render(

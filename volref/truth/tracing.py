@@ -25,8 +25,8 @@ from volref.truth.canvas import light_behind
 from volref.truth.fields import Field, PlainField, Samples
 from volref.truth.integration import Integration
 from volref.truth.march import segments_of
+from volref.truth.meshes.surfaces import visible_surface
 from volref.truth.rendering import decide
-from volref.truth.surfaces import visible_surface
 from volref.workspace import Workspace
 
 # name: (columns, meaning); what a row of the table holds.

@@ -22,8 +22,8 @@ from volref.truth.canvas import light_behind
 from volref.truth.digits.integral import ray_integral
 from volref.truth.digits.lattice import exact_point, exact_span
 from volref.truth.digits.reduced import FloatRay, reduced_rgba
+from volref.truth.meshes.surfaces import visible_surface
 from volref.truth.result import Render
-from volref.truth.surfaces import visible_surface
 
 # Called after each ray with (rays done, rays in all).
 Progress = Callable[[int, int], None]

@@ -8,7 +8,7 @@ import volref as vr
 from tests.benchmarks.peers.problems import MESH_COLOR, Problem
 from volref.arrays import Floats
 from volref.truth.exact import integrate_pixels, prepare
-from volref.truth.surfaces import visible_surface
+from volref.truth.meshes.surfaces import visible_surface
 
 # What the truth may be off by at most, but for rounding.
 TOLERANCE = 1e-11

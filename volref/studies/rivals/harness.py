@@ -21,7 +21,7 @@ from volref.stages.spans import box_spans, cut_spans
 from volref.studies.rivals.medium import Bundle, Integrator, Medium, medium_of
 from volref.studies.rivals.table import Rival
 from volref.truth.canvas import light_behind
-from volref.truth.surfaces import visible_surface
+from volref.truth.meshes.surfaces import visible_surface
 from volref.workspace import Workspace
 
 # Rays that are integrated together, by knob: a march takes 8 samples of each at a time, the others all of

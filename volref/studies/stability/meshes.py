@@ -10,7 +10,7 @@ from volref.phantoms.separable import pixel_ray
 from volref.scene import Camera, Mesh, Scene
 from volref.studies.stability import textbook
 from volref.studies.stability.case import EPS, Case, Measured, measured
-from volref.truth import surfaces
+from volref.truth.meshes import surfaces
 
 FAMILY = "Surfaces"
 

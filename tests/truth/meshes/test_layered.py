@@ -19,8 +19,8 @@ from volref.records import Layers
 from volref.stages.rays import pixel_rays
 from volref.truth.canvas import Canvas
 from volref.truth.integration import Integration
-from volref.truth.layered import _shared_out, integrate_layered
-from volref.truth.surfaces import visible_surface
+from volref.truth.meshes.layered import _shared_out, integrate_layered
+from volref.truth.meshes.surfaces import visible_surface
 
 EXTINCTION, COLOR = 0.35, (0.9, 0.5, 0.25)
 BACKGROUND = np.array([0.05, 0.02, 0.1, 0.4])

@@ -7,7 +7,7 @@ bound (docs/guide/modes.md).
     mip, minip     the extremes of the cubics of those cells that can beat a few samples of the ray
     average        the mean of the cubics of all cells
     isosurface     the first root of the cubics of the cells whose block holds the isovalue
-    slice          the value at one point (see `truth.slicing`)
+    slice          the value at one point (see `truth.modes.slicing`)
 """
 
 from dataclasses import dataclass
@@ -29,8 +29,8 @@ from volref.stages.reductions import Estimates, greatest_along, greatest_of, mea
 from volref.stages.sampling import PAD, Grid, cell_corners, grid_of, trilinear
 from volref.stages.spans import box_spans, cut_spans
 from volref.stages.unit_layers import straight_colors, unit_layers
+from volref.truth.modes.slicing import slice_pixels
 from volref.truth.recentring import recentred_spans
-from volref.truth.slicing import slice_pixels
 from volref.workspace import Workspace
 
 ROUNDOFF = 2.0**-53

@@ -11,7 +11,7 @@ from volref.scene.scene import Scene
 from volref.scene.transfer import TransferFunction
 from volref.scene.volume import Volume
 from volref.stages.rays import pixel_rays
-from volref.truth.surfaces import visible_surface
+from volref.truth.meshes.surfaces import visible_surface
 
 EPS = np.finfo(np.float64).eps
 # A vertex moves by at most half a step of 2^-16 pixel in x and in y, an edge hence by less than one.

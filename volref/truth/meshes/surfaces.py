@@ -9,8 +9,15 @@ from volref.arrays import Integers
 from volref.records import Spans, Surface
 from volref.scene.scene import Scene
 from volref.stages.zbuffer import NOTHING, keep_nearest
-from volref.truth.cutting import caps, is_kept, kept_spans
-from volref.truth.triangles import Triangles, distances_of, fragments, nearest_faces, paint, triangles_of
+from volref.truth.meshes.cutting import caps, is_kept, kept_spans
+from volref.truth.meshes.triangles import (
+    Triangles,
+    distances_of,
+    fragments,
+    nearest_faces,
+    paint,
+    triangles_of,
+)
 
 # Hits are shaded in parts: 2^15 of them with their triangles take 2.4 MB.
 HITS_PER_PART = 2**15
@@ -24,7 +31,7 @@ def visible_surface(scene: Scene) -> Surface:
     one with the lowest (mesh, face) is visible.
 
     Where the scene has clipping planes, what counts is the distance of each fragment; a watertight mesh that
-    is cut open shows a face there, see `volref.truth.cutting.caps`.
+    is cut open shows a face there, see `volref.truth.meshes.cutting.caps`.
 
     Examples
     --------

@@ -11,8 +11,8 @@ import numpy as np
 from volref.arrays import Booleans, Floats, Indices, Integers
 from volref.records import Layers, Surface
 from volref.scene.scene import Scene
-from volref.truth.cutting import caps, is_kept, kept_spans
-from volref.truth.triangles import Triangles, distances_of, fragments, paint, triangles_of
+from volref.truth.meshes.cutting import caps, is_kept, kept_spans
+from volref.truth.meshes.triangles import Triangles, distances_of, fragments, paint, triangles_of
 
 # Pixel, mesh, face, distance, color and opacity.
 _Part: TypeAlias = tuple[Indices, Integers, Integers, Floats, Floats, Floats]
@@ -30,7 +30,7 @@ def visible_layers(scene: Scene, surface: Surface) -> Layers:
     --------
     >>> from volref.scene.camera import Camera
     >>> from volref.scene.mesh import Mesh
-    >>> from volref.truth.surfaces import visible_surface
+    >>> from volref.truth.meshes.surfaces import visible_surface
     >>> camera = Camera.look_at((0, 0, 5), (0, 0, 0), (0, 1, 0), 90.0, 0.1, 10.0)
     >>> corners = np.array([(-1, -1, 0), (1, -1, 0), (0, 1, 0)])
     >>> panes = [Mesh(corners + (0, 0, z), [(0, 1, 2)], opacity=0.5) for z in (0, 1)]

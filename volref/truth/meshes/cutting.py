@@ -15,8 +15,8 @@ from volref.scene.scene import Scene
 from volref.stages.rays import pixel_rays
 from volref.stages.spans import clip_spans
 from volref.stages.zbuffer import NOTHING, keep_nearest
+from volref.truth.meshes.triangles import Elsewhere, Triangles, crossings, distances_of, paint, triangles_of
 from volref.truth.parts import runs
-from volref.truth.triangles import Elsewhere, Triangles, crossings, distances_of, paint, triangles_of
 
 PIXELS_AT_ONCE = 1 << 16
 

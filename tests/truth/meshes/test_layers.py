@@ -15,8 +15,8 @@ from volref.scene.mesh import Mesh
 from volref.scene.plane import Plane
 from volref.scene.scene import Scene
 from volref.stages.rays import pixel_rays
-from volref.truth.layers import visible_layers
-from volref.truth.surfaces import visible_surface
+from volref.truth.meshes.layers import visible_layers
+from volref.truth.meshes.surfaces import visible_surface
 
 VIEW = {"eye": (2.4, 1.7, 1.6), "target": (0, 0, 0), "up": (0, 0, 1)}
 CAMERAS = {

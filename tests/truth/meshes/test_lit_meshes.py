@@ -15,8 +15,8 @@ from volref.scene.lights import Light, Material
 from volref.scene.mesh import Mesh
 from volref.scene.scene import Scene
 from volref.stages.rays import pixel_rays
-from volref.truth.layers import visible_layers
-from volref.truth.surfaces import visible_surface
+from volref.truth.meshes.layers import visible_layers
+from volref.truth.meshes.surfaces import visible_surface
 
 SIDE, RADIUS, COLOR = 24, 1.3, (0.9, 0.5, 0.2)
 VIEWS = {

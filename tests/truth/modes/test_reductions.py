@@ -20,10 +20,10 @@ from volref.phantoms.meshes import sphere_mesh
 from volref.records import Rays
 from volref.scene.transform import transform_directions, transform_points
 from volref.stages.rays import pixel_rays
-from volref.truth import reductions
 from volref.truth.digits.lattice import cells_along, corner_samples, exact_point, exact_span
 from volref.truth.digits.reduced import first_meeting, layer, reduced_value
-from volref.truth.reductions import prepare_reduction, reduce_pixels
+from volref.truth.modes import reductions
+from volref.truth.modes.reductions import prepare_reduction, reduce_pixels
 
 EXTREMES = ("mip", "minip")
 MODES = (*EXTREMES, "average")
