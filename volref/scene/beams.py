@@ -54,26 +54,54 @@ def world_of_beam(
 def beam_of_world(x: Floats, y: Floats, z: Floats, beam: str) -> tuple[Floats, Floats, Floats]:
     """Return slant range (m), azimuth (degrees, 0 to 360) and elevation of points from the antenna.
 
-    The inverse over the 4/3 earth, in closed form, with p = s / R the angle at the centre of the earth:
-
-        r^2 = h^2 + 4 R (R + h) sin^2(p/2)        tan e = (h - 2 (R + h) sin^2(p/2)) / ((R + h) sin p)
-
     Examples
     --------
     >>> [float(p) for p in beam_of_world(np.array(-3.0), np.array(0.0), np.array(4.0), "straight")]
     [5.0, 270.0, 53.13010235415598]
     """
-    ground, height = np.hypot(x, y), z
+    slant, ground, height = chord_of_world(x, y, z, beam)
+    return slant, azimuth_of(x, y), elevation_of(ground, height)
+
+
+def chord_of_world(x: Floats, y: Floats, z: Floats, beam: str) -> tuple[Floats, Floats, Floats]:
+    """Return the length (m) of straight lines from the antenna to points, how far they go along and up.
+
+    Along and up are those of the ground at the antenna.  Over the 4/3 earth, with p = s / R the angle at its
+    centre, the line is the beam, and
+
+        r^2 = h^2 + 4 R (R + h) sin^2(p/2)      along = (R + h) sin p      up = h - 2 (R + h) sin^2(p/2)
+    """
+    ground = np.sqrt(x * x + y * y)
     if beam == "straight":
-        slant = np.hypot(ground, height)
-    else:
-        radius = EFFECTIVE_RADIUS
-        angle = ground / radius
-        drop = 2 * (radius + z) * np.sin(angle / 2) ** 2
-        slant = np.sqrt(np.maximum(z * z + 2 * radius * drop, 0.0))
-        ground, height = (radius + z) * np.sin(angle), z - drop
-    azimuth = np.degrees(np.arctan2(x, y)) % 360.0
-    return slant, azimuth, np.degrees(np.arctan2(height, ground))
+        return np.sqrt(x * x + y * y + z * z), ground, z
+    radius = EFFECTIVE_RADIUS
+    half_sine = np.sin(ground * (0.5 / radius))
+    above = radius + z
+    drop = 2 * above * half_sine * half_sine
+    slant = np.sqrt(np.maximum(z * z + 2 * radius * drop, 0.0))
+    # sin p = 2 sin(p/2) cos(p/2), up to half the way around the earth.
+    return slant, above * 2 * half_sine * np.sqrt(1 - half_sine * half_sine), z - drop
+
+
+def azimuth_of(x: Floats, y: Floats) -> Floats:
+    """Return the azimuth (degrees, 0 to 360) of points seen from the antenna; 0 straight above it.
+
+    By an arcus tangent of one number: it takes a third of the time of one of two.
+    """
+    with np.errstate(divide="ignore", invalid="ignore"):
+        # Not -0, whose quotient would point the other way.
+        turn = np.arctan(y / (x + 0.0))
+    turn *= -180 / np.pi
+    turn += np.where(x >= 0, 90.0, 270.0)
+    return np.asarray(np.where(np.isnan(turn), 0.0, turn))
+
+
+def elevation_of(ground: Floats, height: Floats) -> Floats:
+    """Return the elevation (degrees) of what lies `ground` >= 0 along and `height` up; 0 at the antenna."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        rise = np.arctan(height / ground)
+    rise *= 180 / np.pi
+    return np.asarray(np.where(np.isnan(rise), 0.0, rise))
 
 
 def lowest_point(elevation: Floats) -> Floats:

@@ -28,7 +28,7 @@ from volref.scene.sweep import Sweep
 BEARINGS, MOST_RINGS = 360, 320
 
 # Blocks are two gates long and wide, or that many times larger that there are no more than so many along x
-# and y, without the layer around them; along z there are half as many.
+# and y, without the layer around them; along z there are a quarter as many.
 GATES_A_SIDE, MOST_BLOCKS = 2, 256
 
 # How high blocks are at least, as a part of their width.
@@ -94,11 +94,11 @@ def flag_radar(radar: RadarVolume, reach: float, flag: Flag) -> RadarBlocks:
     low, high = radar.box
     across = (high[0] - low[0]) / (GATES_A_SIDE * radar.gate_length)
     count = math.ceil(min(max(across, 2), MOST_BLOCKS))
-    size = (high - low) / (count, count, count // 2)
+    size = (high - low) / (count, count, max(count // 4, 1))
     # The box of a single level sweep has no height to speak of.
     size[2] = max(size[2], LEAST_HEIGHT * size[0])
     low = low - size
-    shape = count // 2 + 2, count + 2, count + 2
+    shape = max(count // 4, 1) + 2, count + 2, count + 2
     farthest, ring = _rings(radar)
     rounded = ROUNDED * farthest + 1e-12 * float(np.abs(radar.origin).max())
     reaches = reach + ROUNDED_BLOCK * size + rounded

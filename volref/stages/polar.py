@@ -19,9 +19,10 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from volref.arrays import Booleans, Floats, Indices, Integers, Numbers
-from volref.scene.beams import beam_of_world
+from volref.arrays import Booleans, Floats, Indices, Numbers
+from volref.scene.beams import azimuth_of, chord_of_world, elevation_of, widest_ring
 from volref.scene.radar import RadarVolume
+from volref.scene.steps import Steps, steps_of
 from volref.scene.sweep import Sweep
 
 # A point this near to a gate's centre, a radial or a sweep (in gates, shares and degrees) lies on it: its
@@ -31,24 +32,30 @@ ON = 1e-9
 # Radials farther apart than this times their sweep's median have nothing between them: one is missing.
 WIDEST_GAP = 1.75
 
+# Points that are looked up together: fewer, and NumPy's cost per call shows; more, and they leave the cache.
+AT_ONCE = 1 << 15
+
 
 @dataclass(frozen=True, eq=False)
 class RadarTable:
     """A radar laid out for look-ups.
 
-    knots (M,): all azimuths, degrees.  radial (M, S): the radial of sweep s at or before knot m.
+    knots: all M azimuths, degrees.  radial (M + 1) S: the radial of each sweep at or before each knot; the
+    first S are those before all knots, the last ones of their sweeps.
     Of the radials (K,): azimuth, elevation (degrees), `share`, 1 / the angle to the next one (0 if too
     wide), `following`, the next one of the same sweep, and `start`, its first gate in `gates`.
-    Of the sweeps (S,): first_gate, gate_spacing (m), last, the index of the last gate, and `level`,
-    the elevation if all sweeps have one elevation each, else None.
+    Of the sweeps (S,): first_gate, gate_spacing (m), last, the index of the last gate, and their least and
+    greatest elevation, `lowest` and `highest`; `level` if each has only one.
     gates: all values, NaN where a gate has no data.
+    reach: what is seen lies no farther from the antenna, along the beam and along the ground.
     """
 
     beam: str
     origin: tuple[float, float, float]
     bounds: tuple[float, float]
-    knots: Floats
-    radial: Integers
+    reach: tuple[float, float]
+    knots: Steps
+    radial: Indices
     azimuth: Floats
     elevation: Floats
     share: Floats
@@ -57,7 +64,9 @@ class RadarTable:
     first_gate: Floats
     gate_spacing: Floats
     last: Indices
-    level: Floats | None
+    lowest: Steps
+    highest: Steps
+    level: bool
     gates: Numbers
 
 
@@ -79,26 +88,34 @@ def _new_table(radar: RadarVolume) -> RadarTable:
     gates = [sweep.values.shape[1] for sweep in sweeps]
     lengths = np.repeat(gates, counts)
     # Before a sweep's first radial comes its last one: index -1.
+    places = np.append(-1.0, knots)
     radial = [
-        first[s] + (np.searchsorted(sweep.azimuths, knots, side="right") - 1) % counts[s]
+        first[s] + (np.searchsorted(sweep.azimuths, places, side="right") - 1) % counts[s]
         for s, sweep in enumerate(sweeps)
     ]
-    level = all(np.ptp(sweep.elevations) == 0 for sweep in sweeps)
+    tilts = np.array([(sweep.elevations.min(), sweep.elevations.max()) for sweep in sweeps])
+    # A part in 10^9 more than gates reach, for the rounding of what is compared with it.
+    farthest = max(sweep.last_range for sweep in sweeps) * (1 + 2 * ON)
     return RadarTable(
         beam=radar.beam,
         origin=radar.origin,
         bounds=radar.value_bounds,
-        knots=knots,
-        radial=np.stack(radial, axis=1),
+        reach=(farthest, widest_ring(farthest, radar.beam) * (1 + ON)),
+        knots=steps_of(knots),
+        radial=np.stack(radial, axis=1).ravel().astype(np.intp),
         azimuth=np.concatenate([sweep.azimuths for sweep in sweeps]),
         elevation=np.concatenate([sweep.elevations for sweep in sweeps]),
         share=np.concatenate([_share_of_radials(sweep) for sweep in sweeps]),
-        following=np.concatenate([first[s] + np.roll(np.arange(n), -1) for s, n in enumerate(counts)]),
+        following=np.concatenate([first[s] + np.roll(np.arange(n), -1) for s, n in enumerate(counts)]).astype(
+            np.intp
+        ),
         start=np.concatenate(([0], np.cumsum(lengths)[:-1])).astype(np.intp),
         first_gate=np.array([sweep.first_gate for sweep in sweeps]),
         gate_spacing=np.array([sweep.gate_spacing for sweep in sweeps]),
         last=np.array(gates, dtype=np.intp) - 1,
-        level=np.array([sweep.elevations[0] for sweep in sweeps]) if level else None,
+        lowest=steps_of(tilts[:, 0]),
+        highest=steps_of(tilts[:, 1]),
+        level=bool((tilts[:, 0] == tilts[:, 1]).all()),
         gates=_joined_gates(radar),
     )
 
@@ -121,25 +138,28 @@ def polar_lookup(table: RadarTable, points: Floats) -> tuple[Floats, Booleans]:
     The values lie within the radar's `value_bounds`; the error of the interpolation is a few ulp of the
     larger of these.
     """
-    x, y, z = (points[axis] - table.origin[axis] for axis in range(3))
-    if table.beam != "straight":
-        values = beam_lookup(table, *beam_of_world(x, y, z, table.beam))
-        return values, ~np.isnan(values)
-    values = np.full(len(x), np.nan)
-    near = _perhaps_seen(table, x, y, z)
-    if near.size:
-        values[near] = _values_at(table, *beam_of_world(x[near], y[near], z[near], table.beam))
+    values = np.full(points.shape[1], np.nan)
+    for begin in range(0, len(values), AT_ONCE):
+        part = slice(begin, begin + AT_ONCE)
+        x, y, z = (points[axis, part] - table.origin[axis] for axis in range(3))
+        slant, ground, height = chord_of_world(x, y, z, table.beam)
+        near = np.flatnonzero(_perhaps_seen(table, x, y, slant, height))
+        if near.size == len(x):
+            values[part] = _values_at(table, slant, azimuth_of(x, y), elevation_of(ground, height))
+        elif near.size:
+            x, y, slant, ground, height = (array.take(near) for array in (x, y, slant, ground, height))
+            values[begin + near] = _values_at(table, slant, azimuth_of(x, y), elevation_of(ground, height))
     return values, ~np.isnan(values)
 
 
 def beam_lookup(table: RadarTable, slant: Floats, azimuth: Floats, elevation: Floats) -> Floats:
     """Return the value (n,) at slant ranges (m), azimuths (0 to 360) and elevations (degrees), else NaN."""
-    near = np.flatnonzero(_within_reach(table, slant, elevation))
-    if near.size == len(slant):
-        return _values_at(table, slant, azimuth, elevation)
+    near = slant <= table.reach[0]
+    near &= elevation >= table.lowest.numbers[0] - ON
+    near &= elevation <= table.highest.numbers[-2] + ON
     values = np.full(len(slant), np.nan)
-    if near.size:
-        values[near] = _values_at(table, slant[near], azimuth[near], elevation[near])
+    for chosen in np.array_split(np.flatnonzero(near), 1 + len(slant) // AT_ONCE):
+        values[chosen] = _values_at(table, slant[chosen], azimuth[chosen], elevation[chosen])
     return values
 
 
@@ -150,134 +170,136 @@ def sweep_lookup(
 
     nearest: that of the gate around the point, as it was measured, in place of the interpolated one.
     """
-    azimuth, knot = _folded(table, azimuth)
-    return _in_sweep(table, np.full(len(slant), sweep), knot, slant, azimuth, nearest=nearest)[0]
+    azimuth, row = _folded(table, azimuth)
+    sweeps = np.full((1, len(slant)), sweep)
+    before, after, share, _ = _around(table, row + sweeps, azimuth)
+    if nearest:
+        before = np.where(np.rint(share) == 1, after, before)
+        after, share = before, np.where(np.isnan(share), np.nan, 0.0)
+    return np.asarray(_on_sweeps(table, sweeps, (before, after), share, slant, nearest=nearest)[0])
 
 
 def sweep_elevation(table: RadarTable, sweep: int, azimuth: Floats) -> Floats:
     """Return the elevation (n,) of one sweep at azimuths (0 to 360), degrees."""
-    azimuth, knot = _folded(table, azimuth)
-    return _around(table, table.radial[knot, sweep], azimuth)[2]
+    azimuth, row = _folded(table, azimuth)
+    return _around(table, row + sweep, azimuth)[3]
 
 
 def _folded(table: RadarTable, azimuth: Floats) -> tuple[Floats, Indices]:
-    """Return azimuths (n,) below 360, and the knot at or before each, -1 for the last."""
+    """Return azimuths (n,) below 360, and where in `table.radial` those at or before each begin."""
     azimuth = np.where(azimuth > 360.0 - ON, 0.0, azimuth)
-    return azimuth, np.searchsorted(table.knots, azimuth + ON, side="right") - 1
+    return azimuth, table.knots.count_up_to(azimuth + ON) * len(table.last)
 
 
-def _perhaps_seen(table: RadarTable, x: Floats, y: Floats, z: Floats) -> Indices:
-    """Return which points are not beyond all sweeps of straight beams; angles cost more than all the rest."""
-    slant = np.sqrt(x * x + y * y + z * z)
-    low, high = np.sin(np.radians((table.elevation.min() - ON, table.elevation.max() + ON)))
+def _perhaps_seen(table: RadarTable, x: Floats, y: Floats, slant: Floats, height: Floats) -> Booleans:
+    """Tell which points (n,) are not beyond all sweeps; angles cost more than all the rest."""
+    tilts = np.array((table.lowest.numbers[0] - ON, table.highest.numbers[-2] + ON))
+    low, high = np.sin(np.radians(np.clip(tilts, -90.0, 90.0)))
+    farthest, widest = table.reach
+    inside = slant <= farthest
     # The slack covers the rounding of slant and sines; what it lets through is looked at again.
-    slack = 1e-12 * slant
-    inside = slant <= (1 + 1e-12) * _ends(table).max()
-    inside &= z >= low * slant - slack
-    inside &= z <= high * slant + slack
-    return np.flatnonzero(inside)
-
-
-def _ends(table: RadarTable) -> Floats:
-    """Return where the sweeps (S,) end, metres."""
-    return np.asarray(table.first_gate + (table.last + 0.5 + ON) * table.gate_spacing)
-
-
-def _within_reach(table: RadarTable, slant: Floats, elevation: Floats) -> Booleans:
-    """Leave out the points (n,) that lie beyond all sweeps."""
-    inside = slant <= _ends(table).max()
-    inside &= elevation >= table.elevation.min() - ON
-    inside &= elevation <= table.elevation.max() + ON
+    inside &= height >= (low - 1e-12) * slant
+    inside &= height <= (high + 1e-12) * slant
+    # Over a round earth the points on its other side have the same chords.
+    inside &= np.maximum(np.abs(x), np.abs(y)) <= widest
     return np.asarray(inside)
 
 
 def _values_at(table: RadarTable, slant: Floats, azimuth: Floats, elevation: Floats) -> Floats:
-    azimuth, knot = _folded(table, azimuth)
-    low = _sweeps_below(table, knot, azimuth, elevation)
-    high = np.minimum(low + 1, len(table.last) - 1)
+    azimuth, row = _folded(table, azimuth)
+    low = _sweeps_below(table, row, azimuth, elevation)
     below = low < 0
-    np.maximum(low, 0, out=low)
-    values, tilt = _in_sweep(table, low, knot, slant, azimuth)
-    upper, upper_tilt = _in_sweep(table, high, knot, slant, azimuth)
-    rise = upper_tilt - tilt
-    share = (elevation - tilt) / np.where(rise > 0, rise, 1.0)
+    sweeps = np.stack((np.maximum(low, 0), np.minimum(low + 1, len(table.last) - 1)))
+    before, after, share, tilts = _around(table, row + sweeps, azimuth)
+    values = _on_sweeps(table, sweeps, (before, after), share, slant)
+    tilt, rise = tilts[0], tilts[1] - tilts[0]
+    above = elevation - tilt
+    share = above / np.where(rise > 0, rise, 1.0)
     # Above the highest sweep there is no other: the point is seen only if it lies on that one.
-    below |= (low == high) & (elevation > tilt + ON)
-    share[(np.abs(elevation - tilt) <= ON) | (low == high)] = 0.0
-    values = np.clip(_between(values, upper, share), *table.bounds)
-    values[below] = np.nan
-    return values
+    highest = low == len(table.last) - 1
+    below |= highest & (above > ON)
+    share[(np.abs(above) <= ON) | highest] = 0.0
+    found = values[0] + share * (values[1] - values[0])
+    # What contributes with weight 0 may be NaN.
+    np.copyto(found, values[0], where=share == 0)
+    np.clip(found, *table.bounds, out=found)
+    found[below] = np.nan
+    return np.asarray(found)
 
 
-def _sweeps_below(table: RadarTable, knot: Indices, azimuth: Floats, elevation: Floats) -> Indices:
+def _sweeps_below(table: RadarTable, row: Indices, azimuth: Floats, elevation: Floats) -> Indices:
     """Return the index (n,) of the highest sweep that is not above the point, -1 if there is none."""
-    if table.level is not None:
-        return np.searchsorted(table.level, elevation + ON, side="right") - 1
-    below = np.full(len(knot), -1, dtype=np.intp)
-    for s in range(len(table.last)):
-        _, _, tilt = _around(table, table.radial[knot, s], azimuth)
-        below += tilt <= elevation + ON
-    return below
+    place = elevation + ON
+    count = table.highest.count_up_to(place)
+    if table.level:
+        return count - 1
+    # Sweeps do not cross: only those count that are below the point at some azimuths and above at others.
+    most = table.lowest.count_up_to(place + ON)
+    unsure = np.flatnonzero(count < most)
+    while unsure.size:
+        _, _, _, tilt = _around(table, row[unsure] + count[unsure], azimuth[unsure])
+        unsure = unsure[tilt <= place[unsure]]
+        count[unsure] += 1
+        unsure = unsure[count[unsure] < most[unsure]]
+    return count - 1
 
 
-def _around(table: RadarTable, radial: Indices, azimuth: Floats) -> tuple[Indices, Floats, Floats]:
-    """Return the radial after `radial`, the share of the way to it, and the elevation there.
+def _around(table: RadarTable, at: Indices, azimuth: Floats) -> tuple[Indices, Indices, Floats, Floats]:
+    """Return the radials before and after azimuths (n,), the share of the way, and the elevation there.
 
-    The share is NaN between radials that are too far apart.
+    at (..., n): where `table.radial` has the one before.  At share 0 and 1 both are the one that counts.  The
+    share is NaN between radials that are too far apart.
     """
-    after = table.following[radial]
-    turn = azimuth - table.azimuth[radial]
-    turn[turn < -ON] += 360.0
+    before = table.radial.take(at)
+    after = table.following.take(before)
+    turn = azimuth - table.azimuth.take(before)
+    np.add(turn, 360.0, out=turn, where=turn < -ON)
     np.maximum(turn, 0.0, out=turn)
-    share = turn * table.share[radial]
-    share[share < ON] = 0.0
-    share[share > 1 - ON] = 1.0
-    tilt = table.elevation[radial]
-    tilt = tilt + share * (table.elevation[after] - tilt)
-    across = (table.share[radial] == 0) & (turn > ON)
-    share[across] = np.nan
-    return after, share, tilt
+    per_degree = table.share.take(before)
+    share = turn * per_degree
+    onto = share > 1 - ON
+    np.copyto(before, after, where=onto)
+    away = share < ON
+    np.copyto(after, before, where=away)
+    share[onto | away] = 0.0
+    tilt = table.elevation.take(before)
+    if not table.level:
+        tilt += share * (table.elevation.take(after) - tilt)
+    np.copyto(share, np.nan, where=away & (per_degree == 0) & (turn > ON))
+    return before, after, share, tilt
 
 
-def _in_sweep(
+def _on_sweeps(
     table: RadarTable,
-    sweep: Indices,
-    knot: Indices,
+    sweeps: Indices,
+    radials: tuple[Indices, Indices],
+    share: Floats,
     slant: Floats,
-    azimuth: Floats,
     *,
     nearest: bool = False,
-) -> tuple[Floats, Floats]:
-    """Return the value (n,) on each point's sweep at its range and azimuth, and the elevation there."""
-    before = table.radial[knot, sweep]
-    after, share, tilt = _around(table, before, azimuth)
-    last = table.last[sweep]
-    gate = (slant - table.first_gate[sweep]) / table.gate_spacing[sweep]
-    outside = (gate < -0.5 - ON) | (gate > last + 0.5 + ON)
+) -> Floats:
+    """Return the values (m, n) on m sweeps for each of n points, at their range and between two radials."""
+    last = table.last.take(sweeps)
+    gate = slant - table.first_gate.take(sweeps)
+    gate /= table.gate_spacing.take(sweeps)
+    outside = (gate < -0.5 - ON) | (gate > last + (0.5 + ON))
     centre = np.rint(gate)
-    gate = np.where(nearest | (np.abs(gate - centre) < ON), centre, gate)
-    gate = np.clip(gate, 0, last)
+    np.copyto(gate, centre, where=nearest | (np.abs(gate - centre) < ON))
+    np.maximum(gate, 0.0, out=gate)
+    np.minimum(gate, last, out=gate)
     lower = gate.astype(np.intp)
     part = gate - lower
-    upper = np.minimum(lower + 1, last)
-    along = [
-        _between(
-            table.gates[table.start[radial] + lower].astype(np.float64),
-            table.gates[table.start[radial] + upper].astype(np.float64),
-            part,
-        )
-        for radial in (before, after)
-    ]
-    values = _between(along[0], along[1], np.rint(share) if nearest else share)
+    # On a gate's centre the next one does not count.
+    upper = lower + (part > 0)
+    along = []
+    for radial in radials:
+        start = table.start.take(radial)
+        first = table.gates.take(start + lower).astype(np.float64)
+        first += part * (table.gates.take(start + upper) - first)
+        along.append(first)
+    values = along[0]
+    values += share * (along[1] - values)
     values[outside] = np.nan
-    return values, tilt
-
-
-def _between(first: Floats, second: Floats, share: Floats) -> Floats:
-    """Return first + share (second - first); at share 0 and 1 the other one does not matter, NaN or not."""
-    values = first + share * (second - first)
-    np.copyto(values, first, where=share == 0)
-    np.copyto(values, second, where=share == 1)
     return values
 
 
