@@ -9,6 +9,7 @@ import volref as vr
 from data_gen.gallery.scans import CT, HEAD, PRESETS, STENT, middle, scan, seen_from
 from data_gen.gallery.sheets import BLACK, Settings, Tile, tile_of
 from volref.arrays import Vector
+from volref.io.guard import Foreign
 
 # A level of 8 bits: what no eye sees.
 TOLERANCE = 1 / 255
@@ -44,7 +45,7 @@ def modes(settings: Settings) -> Iterator[Tile]:
 
 
 def _scenes(look: Look, pixels: int) -> Iterator[tuple[str, vr.Scene]]:
-    def scene(transfer: vr.TransferFunction, **more: object) -> vr.Scene:
+    def scene(transfer: vr.TransferFunction, **more: Foreign) -> vr.Scene:
         return vr.Scene(look.volume, transfer, look.camera, pixels, pixels, background=BLACK, **more)
 
     yield "composite", scene(look.transfer)

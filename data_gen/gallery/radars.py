@@ -6,7 +6,7 @@ import numpy as np
 
 import volref as vr
 from data_gen.gallery.sheets import Settings, Tile, codes_of
-from volref.arrays import Bytes, Floats
+from volref.arrays import Bytes
 from volref.phantoms.meshes import plane_mesh
 
 RADAR = "radar_knmi_denhelder_20110610.npz"
@@ -123,6 +123,5 @@ def _bar(height: int) -> Bytes:
 def _band_colors() -> list[list[int]]:
     """Return the colours of the middles of the bands."""
     table = vr.dbz_transfer()
-    knots: Floats = table.values
-    rows = [int(np.searchsorted(knots, dbz + 2.5)) - 1 for dbz in BANDS]
-    return np.rint(255 * table.colors[rows]).astype(int).tolist()
+    rows = [int(np.searchsorted(table.values, dbz + 2.5)) - 1 for dbz in BANDS]
+    return [[round(255 * float(channel)) for channel in table.colors[row]] for row in rows]

@@ -15,6 +15,7 @@ WHITE_MATTER, NUT, TEAPOT = "mesh_mni_white_matter.ply", "mesh_nut.ply", "mesh_t
 
 # Colours are light here, and are encoded as sRGB.
 NIGHT = (0.01, 0.012, 0.016, 1.0)
+GOLD, GREEN, RED = (0.9, 0.6, 0.2), (0.1, 0.5, 0.35), (0.7, 0.1, 0.05)
 PLASTIC = vr.Material("blinn-phong", ambient=0.25, diffuse=0.75, specular=0.35, shininess=40, two_sided=True)
 
 
@@ -32,7 +33,7 @@ def _scenes(settings: Settings) -> Iterator[tuple[str, vr.Scene]]:
     brain = smooth(vr.load_mesh(settings.data / WHITE_MATTER), (0.9, 0.75, 0.6))
     yield "white matter, opaque, lit", _alone(brain, pixels, 235, 20)
     nut = dataclasses.replace(
-        vr.load_mesh(settings.data / NUT), colors=(0.9, 0.6, 0.2), coloring="uniform", lit=True
+        vr.load_mesh(settings.data / NUT), colors=np.array(GOLD), coloring="uniform", lit=True
     )
     yield "nut", _alone(nut, pixels, 30, 35)
     center = _center(nut)
@@ -44,7 +45,7 @@ def _scenes(settings: Settings) -> Iterator[tuple[str, vr.Scene]]:
     )
     yield "teapot, textured, lit", _alone(tiled, pixels, 30, 25)
     glazed = dataclasses.replace(
-        teapot, colors=(0.1, 0.5, 0.35), coloring="uniform", lit=True, back_color=(0.7, 0.1, 0.05)
+        teapot, colors=np.array(GREEN), coloring="uniform", lit=True, back_color=np.array(RED)
     )
     opened = vr.Plane(_center(teapot), -towards(0, 0))
     yield "teapot, cut open: its back is red", _alone(glazed, pixels, 20, 25, [opened])
@@ -99,7 +100,7 @@ def smooth(mesh: vr.Mesh, color: tuple[float, float, float]) -> vr.Mesh:
 
     normals = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False).vertex_normals
     return dataclasses.replace(
-        mesh, colors=color, coloring="uniform", lit=True, normals=np.array(normals, np.float64)
+        mesh, colors=np.array(color), coloring="uniform", lit=True, normals=np.array(normals, np.float64)
     )
 
 

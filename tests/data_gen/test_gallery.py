@@ -118,11 +118,13 @@ def test_the_front_of_a_scan_faces_the_camera_with_the_head_up():
     assert seen_from(scan(DATA / STENT), 180).view_from_world[2, 1] < 0
 
 
-def test_the_bar_of_a_radar_map_has_the_colours_of_the_bands():
-    *_, bar = maps(Settings(DATA, 60))
-    strip = bar.picture[::-1, 10].astype(int)
-    found = [tuple(color) for i, color in enumerate(strip) if i == 0 or (color != strip[i - 1]).any()]
+def test_the_bar_of_a_radar_map_has_the_colours_of_the_bands_from_below_up():
+    *_, bar = maps(Settings(DATA, 85))
+    strip = bar.picture[10:-10, 10]
+    assert len(strip) == 10 * len(BANDS)
     table = dbz_transfer()
-    for dbz in BANDS:
-        at = int(np.searchsorted(table.values, dbz, side="right")) - 1
-        assert tuple(np.rint(255 * table.colors[at]).astype(int)) in found
+    for dbz, color in zip(BANDS, strip[-5::-10], strict=True):
+        at = int(np.searchsorted(table.values, dbz + 2.5)) - 1
+        assert color.tolist() == np.rint(255 * table.colors[at]).tolist()
+    assert strip[-5].tolist() == [4, 233, 231]
+    assert strip[5].tolist() == [253, 253, 253]
