@@ -240,3 +240,23 @@ def test_a_colour_that_only_clear_values_have_does_not_count():
     colors, strength = [(1, 0, 0), (0, 1, 0), (0, 1, 0)], [0.0, 0.0, 1.0]
     scene = dataclasses.replace(smooth_scene(), transfer=vr.TransferFunction([0, 0.3, 1], colors, strength))
     assert march_plan(scene).palette.constant == (0.0, 1.0, 0.0)
+
+
+LOOKS = {
+    "lights": [vr.Light.headlight()],
+    "material": vr.Material("lambert"),
+    "mode": "mip",
+    "clip": [vr.Plane((0, 0, 0), (1, 0, 0))],
+    "gradient": "sobel",
+    "classification": "pre",
+}
+
+
+@pytest.mark.parametrize("name", LOOKS)
+def test_a_plan_of_another_look_is_refused(name):
+    scene = sparse_scene()
+    other = dataclasses.replace(scene, **{name: LOOKS[name]})
+    with pytest.raises(vr.SceneError, match=r"plan must be one for this scene.*make one with volref.plan"):
+        vr.render(other, plan=vr.plan(scene))
+    smaller = dataclasses.replace(scene, width=4, height=4, background=(1, 1, 1, 1))
+    assert vr.render(smaller, plan=vr.plan(scene)).met_tolerance

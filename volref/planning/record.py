@@ -12,6 +12,9 @@ from volref.scene.scene import Scene
 # Segments of a ray that are sampled together, unless that takes them too far: then 3.
 SEGMENTS_PER_BLOCK = 6
 
+# What a plan is made for, beside volume, transfer function and meshes.
+LOOK = ("lights", "material", "mode", "isovalue", "slice_plane", "clip", "gradient", "classification")
+
 # Stages that only save work: "forced in" means that they are switched off.
 SHORTCUTS = ("empty space", "early termination")
 
@@ -125,13 +128,14 @@ class Plan:
         Raises
         ------
         SceneError
-            If volume, transfer function or the presence of meshes differ.
+            If anything but the camera, the size, the background and which meshes there are differs.
         """
         mine = self.scene
         same = mine.volume is scene.volume and mine.transfer is scene.transfer
-        if not same or bool(mine.meshes) != bool(scene.meshes):
-            message = "plan must be one for this scene, got the plan of another volume, transfer function or "
-            raise SceneError(message + "meshes; make one with volref.plan(scene)")
+        same &= bool(mine.meshes) == bool(scene.meshes)
+        if not same or any(getattr(mine, name) != getattr(scene, name) for name in LOOK):
+            message = "plan must be one for this scene, got the plan of another volume, transfer function, "
+            raise SceneError(message + "look or of other meshes; make one with volref.plan(scene)")
         if self.offsets is not None and self.offsets.shape != (scene.width * scene.height,):
             message = f"plan.offsets must be one per pixel of {scene.width} x {scene.height}, got shape "
             raise SceneError(message + f"{self.offsets.shape}; make an image of the scene's size")

@@ -12,23 +12,26 @@ from dataclasses import dataclass
 import numpy as np
 
 from volref import planning
-from volref.arrays import Floats
+from volref.arrays import Booleans, Floats, Indices, Numbers
 from volref.errors import SceneError
 from volref.planning import RAYS_PER_CHUNK, Plan, Stage
 from volref.scene.footprint import Rectangle
 from volref.scene.scene import Scene
 from volref.truth.canvas import Canvas
-from volref.truth.choosing import around_each, tiles_to_try
+from volref.truth.choosing import SIDE, TILES, around_each
 from volref.truth.crew import Crew
 from volref.truth.integration import Integration
-from volref.truth.parts import cut
+from volref.truth.parts import Parts, cut
 
 # The error of a step is measured against this many times finer segments.
 FINER = 8
 
-# Estimates are scaled so that they hold for this share of the pixels tried, with this margin, but never down
-# by more than the leading term of the error says: there the estimate is 8 times the error.
-HELD, MARGIN, LEAST_FACTOR = 0.999, 2.0, 1 / 8
+# Bounds are made to hold for this share of the pixels tried, with this margin.
+HELD, MARGIN = 0.999, 3.0
+
+# What estimates may be scaled by: never down by more than the leading term of the error says, where they are
+# 8 times the error; and what would have to be scaled up by more than the last is better covered by a floor.
+FACTORS = tuple(2.0**k for k in range(-3, 5))
 
 # Rays that miss the tolerance are marched again at a quarter of the step, at most so often.
 ROUNDS, QUARTER = 3, 4
@@ -44,28 +47,34 @@ class Scale:
 
 def march_to_tolerance(scene: Scene, plan: Plan, canvas: Canvas, crew: Crew, where: Rectangle) -> Plan:
     """Fill in the pixels of `where`; return the plan that was followed."""
-    marching = _marching(scene, plan, None)
-    scale = _scale(scene, marching, canvas)
-    crew.draw(canvas, Integration(scene, marching), crew.runs(where, scene.width, RAYS_PER_CHUNK))
-    shape, own = (scene.height, scene.width), canvas.bound.copy()
-    canvas.bound[:] = _bound(scale, own, shape) + marching.termination
-    again, finer = 0, marching
+    marching = finer = _marching(scene, plan, None)
+    integration, shape = Integration(scene, marching), (scene.height, scene.width)
+    reached = drawn(canvas, crew, integration, crew.runs(where, scene.width, RAYS_PER_CHUNK))
+    own = np.where(reached, canvas.bound, 0.0)
+    scale = _scale(scene, marching, canvas, own)
+    # What lies behind an early end is certain, and not to be scaled down with the rest.
+    certain = marching.termination * max(integration.field.color_limit, *scene.background, 1.0)
+    canvas.bound[reached] = (_bound(scale, own, shape) + certain)[reached]
+    again = 0
     for _ in range(ROUNDS):
-        left = np.flatnonzero(canvas.bound > plan.tolerance)
+        left = reached & (canvas.bound > plan.tolerance)
+        if not left.any():
+            break
         try:
             finer = _marching(scene, plan, finer.step / QUARTER)
         except SceneError:  # more segments than any march may take
             break
-        if len(left) == 0:
-            break
-        again = again or len(left)
-        bound = canvas.bound.copy()
+        again, bound = again or int(np.count_nonzero(left)), canvas.bound.copy()
         # With their neighbours, whose estimates count too.
-        missing = around_each((bound > plan.tolerance).astype(np.float64).reshape(shape)).reshape(-1) > 0
-        crew.draw(canvas, Integration(scene, finer), cut(np.flatnonzero(missing), RAYS_PER_CHUNK))
-        own[missing] = canvas.bound[missing]
+        missing = np.flatnonzero(reached & (_around(left.astype(np.float64), shape) > 0))
+        before, moved = canvas.rgba[missing], np.zeros(len(bound))
+        redrawn = drawn(canvas, crew, Integration(scene, finer), cut(missing, RAYS_PER_CHUNK))
+        own[redrawn], better = canvas.bound[redrawn], left & redrawn
         scale = dataclasses.replace(scale, floor=scale.floor / QUARTER)
-        bound[left] = _bound(scale, own, shape)[left] + marching.termination
+        # A march of first order moves by three times as much as it is off then.
+        moved[missing] = np.abs(canvas.rgba[missing] - before).max(axis=1) * (MARGIN / (QUARTER - 1))
+        new = np.maximum(_bound(scale, own, shape), _around(moved, shape)) + certain
+        bound[better] = new[better]
         canvas.bound[:] = bound
     reason = f"marched, for no proof covers {planning.sampled_because(scene)}; estimates scaled by "
     reason += f"{scale.factor:.3g}, as tiles at 1/{FINER} of the step say; {again} pixels at finer steps"
@@ -73,35 +82,66 @@ def march_to_tolerance(scene: Scene, plan: Plan, canvas: Canvas, crew: Crew, whe
     return dataclasses.replace(marching, stages=(*marching.stages, stage))
 
 
+def drawn(canvas: Canvas, crew: Crew, integration: Integration, parts: Parts) -> Booleans:
+    """Draw `parts`; return the pixels (H W,) that were reached before the deadline, with an estimate now."""
+    known = canvas.bound.copy()
+    canvas.bound[:] = np.nan
+    crew.draw(canvas, integration, parts)
+    reached: Booleans = ~np.isnan(canvas.bound)
+    canvas.bound[~reached] = known[~reached]
+    return reached
+
+
 def _bound(scale: Scale, own: Floats, shape: tuple[int, int]) -> Floats:
     """Return the bound (H W,) that follows from the estimates of the pixels themselves."""
-    return scale.factor * around_each(own.reshape(shape)).reshape(-1) + scale.floor
+    return scale.factor * _around(own, shape) + scale.floor
+
+
+def _around(own: Floats, shape: tuple[int, int]) -> Floats:
+    """Return the greatest (H W,) of each pixel and its neighbours."""
+    return around_each(own.reshape(shape)).reshape(-1)
 
 
 def _marching(scene: Scene, plan: Plan, step: float | None) -> Plan:
     return planning.plan(scene, method="march", step=step, tolerance=plan.tolerance)
 
 
-def _scale(scene: Scene, marching: Plan, canvas: Canvas) -> Scale:
-    """Return how the estimates relate to the error, on a few tiles or, of a tiny image, on all of it."""
-    tiles = tiles_to_try(scene)
-    if len(tiles) == 0:
-        tiles = np.arange(scene.width * scene.height).reshape(1, scene.height, scene.width)
+def _scale(scene: Scene, marching: Plan, canvas: Canvas, own: Floats) -> Scale:
+    """Return how the estimates relate to the error, on a few tiles or, of a small image, on all of it."""
+    tiles = _tiles_seen(own.reshape(scene.height, scene.width))
     pixels = tiles.ravel()
-
-    def marched(plan: Plan) -> tuple[Floats, Floats]:
-        done = canvas.integrated(Integration(scene, plan), pixels, plan.tolerance)
-        return done.rgba, done.bound
-
-    rgba, estimate = marched(marching)
+    if len(pixels) == 0:
+        return Scale(MARGIN, 0.0)
     try:
-        truth, _ = marched(_marching(scene, marching, marching.step / FINER))
+        finer = Integration(scene, _marching(scene, marching, marching.step / FINER))
     except SceneError:
         return Scale(MARGIN, 0.0)
-    error = np.abs(rgba - truth).max(axis=1)
-    estimate = around_each(estimate.reshape(tiles.shape)).ravel()
-    seen = estimate > 0
-    ratio = float(np.quantile(error[seen] / estimate[seen], HELD)) if seen.any() else 0.0
-    factor = float(np.clip(MARGIN * ratio, LEAST_FACTOR, 8 * MARGIN))
-    missed = np.maximum(error - factor * estimate, 0.0)
-    return Scale(factor, float(MARGIN * np.quantile(missed, HELD)))
+    truth = canvas.integrated(finer, pixels, marching.tolerance).rgba
+    error = np.abs(canvas.rgba[pixels] - truth).max(axis=1)
+    estimate = around_each(own[tiles]).ravel()
+    return min((_with_floor(factor, error, estimate) for factor in FACTORS), key=lambda scale: scale[0])[1]
+
+
+def _with_floor(factor: float, error: Floats, estimate: Floats) -> tuple[float, Scale]:
+    """Return what the bounds would be on average with this factor, and the scale with the floor it needs."""
+    floor = float(np.quantile(np.maximum(MARGIN * error - factor * estimate, 0.0), HELD))
+    return float(np.mean(factor * estimate)) + floor, Scale(factor, floor)
+
+
+def _tiles_seen(own: Floats) -> Indices:
+    """Return the pixels (k, h, w) of tiles in which something was drawn, or all of a small image."""
+    height, width = own.shape
+    pixels = np.arange(own.size).reshape(own.shape)
+    if own.size <= TILES * SIDE * SIDE:
+        return pixels[None]
+    down, across = max(height // SIDE, 1), max(width // SIDE, 1)
+    h, w = min(SIDE, height), min(SIDE, width)
+
+    def tiled(image: Numbers) -> Numbers:
+        whole = image[: down * h, : across * w].reshape(down, h, across, w)
+        return whole.swapaxes(1, 2).reshape(-1, h, w)
+
+    tiles = tiled(pixels)
+    seen = np.flatnonzero(tiled(own).max(axis=(1, 2)) > 0)
+    chosen = np.random.default_rng(0).choice(seen, min(TILES, len(seen)), replace=False)
+    return np.asarray(tiles[chosen])

@@ -15,7 +15,7 @@ from volref.scene.scene import Scene
 from volref.truth.canvas import Canvas
 from volref.truth.choosing import Choice, around_each, choose
 from volref.truth.crew import Crew, Progress, available_cores
-from volref.truth.estimating import march_to_tolerance
+from volref.truth.estimating import drawn, march_to_tolerance
 from volref.truth.integration import Integration
 from volref.truth.meshes.surfaces import visible_surface
 from volref.truth.parts import TILE_HEIGHT, TILE_WIDTH, cut, tiles
@@ -143,11 +143,10 @@ def _march_then_mend(integration: Integration, choice: Choice, canvas: Canvas, c
     """March, scale the estimates, and integrate exactly the pixels whose estimate exceeds the tolerance."""
     scene, plan = integration.scene, choice.plan
     where = _where(scene, plan)
-    crew.draw(canvas, Integration(scene, plan), crew.runs(where, scene.width, RAYS_PER_CHUNK))
-    around = around_each(canvas.bound.reshape(scene.height, scene.width))
-    np.multiply(around.reshape(-1), choice.factor, out=canvas.bound)
-    canvas.bound += plan.termination
-    left = np.flatnonzero(canvas.bound > plan.tolerance)
+    reached = drawn(canvas, crew, Integration(scene, plan), crew.runs(where, scene.width, RAYS_PER_CHUNK))
+    own = np.where(reached, canvas.bound, 0.0).reshape(scene.height, scene.width)
+    canvas.bound[reached] = (choice.factor * around_each(own).reshape(-1) + plan.termination)[reached]
+    left = np.flatnonzero(reached & (canvas.bound > plan.tolerance))
     crew.draw(canvas, integration, cut(left, TILE_WIDTH * TILE_HEIGHT), plan.tolerance)
     reason = f"marched, its estimates scaled by {choice.factor:.3g} after tiles integrated exactly; "
     reason += f"{len(left)} pixels above the tolerance integrated exactly"
