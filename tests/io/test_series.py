@@ -61,7 +61,7 @@ def test_the_last_two_volumes_stay_in_memory_and_no_more(folder):
 
 def test_a_radar_file_with_an_axis_of_time_is_a_series(tmp_path):
     np.savez(tmp_path / "radar.npz", **radar_arrays())
-    series = load_series(tmp_path / "radar.npz", [0, 300], kind="radar")
+    series = load_series(tmp_path / "radar.npz", [0, 300])
     for i, time in enumerate((0, 300)):
         codes = radar_arrays()["codes"][i]
         assert np.array_equal(series.at(time).sweeps[1].values, codes[1] * 0.5 - 32)

@@ -10,7 +10,7 @@ from volref.arrays import one_of
 from volref.errors import FormatError
 from volref.io.guard import Foreign, existing_file, one_line
 from volref.io.npy import npz_headers
-from volref.io.radar.door import load_radar
+from volref.io.radar.door import holds_radar, load_radar
 from volref.io.readers import READERS, suffix_of
 from volref.io.volumes import load_volume
 from volref.scene.series import Frame, Series
@@ -28,7 +28,7 @@ def load_series(
     paths: str | Path | Sequence[str | Path],
     times: ArrayLike | None = None,
     *,
-    kind: str = "volume",
+    kind: str | None = None,
     **statement: Foreign,
 ) -> Series:
     """Series of the volumes in files, which are read when they are needed; the last two stay in memory.
@@ -41,7 +41,8 @@ def load_series(
     times
         Seconds, one for each; default 0, 1, 2 ...
     kind
-        "volume", read by `volref.load_volume`, or "radar", by `volref.load_radar`.
+        "volume", read by `volref.load_volume`, or "radar", by `volref.load_radar`; default what the first
+        file is.
     statement
         What these are to be told, for every file.
 
@@ -52,7 +53,7 @@ def load_series(
     SceneError
         If the times do not rise, or there are not as many as volumes.
     """
-    one_of("kind", kind, KINDS)
+    kind = _kind_of(paths) if kind is None else one_of("kind", kind, KINDS)
     files = _files_in(Path(paths), kind) if isinstance(paths, str | Path) else [Path(path) for path in paths]
     if not files:
         message = "series must have at least one file, got none; name a folder or files"
@@ -68,6 +69,15 @@ def load_series(
             else [partial(load, file, time=i) for i in range(instants)]
         )
     return Series(loaders, range(len(loaders)) if times is None else times)
+
+
+def _kind_of(paths: str | Path | Sequence[str | Path]) -> str:
+    """Return what the first file is, "volume" where there is none."""
+    named = [Path(paths)] if isinstance(paths, str | Path) else [Path(path) for path in paths]
+    if len(named) == 1 and named[0].is_dir():
+        named = sorted(entry for entry in named[0].iterdir() if entry.name[0] != ".")
+    files = [path for path in named if path.is_file() and path.suffix.lower() in RADAR_SUFFIXES]
+    return "radar" if files and holds_radar(files[0]) else "volume"
 
 
 def _files_in(path: Path, kind: str) -> list[Path]:

@@ -131,6 +131,8 @@ def steps(
 def dbz_transfer(extinction: float = 1e-3, *, banded: bool = True) -> TransferFunction:
     """Return the usual colours of radar reflectivity (dBZ): those of the US National Weather Service.
 
+    The colours are screen codes over 255: write images of them with encoding "none".
+
     Bands of 5 dBZ from 5 to 75 and above: blue, green, yellow, red, purple, white.  `banded=False` runs from
     the colour of one band's beginning to the next's.  Below 5 dBZ, and so where there is no echo, nothing is
     seen; from there the extinction grows with the square of the distance to 5 dBZ, up to `extinction` per
