@@ -13,7 +13,7 @@ from volref.phantoms.transfer import dbz_transfer
 from volref.planning import may_be_seen
 from volref.scene import radar_blocks
 from volref.scene.beams import world_of_beam
-from volref.scene.radar_blocks import flag_radar
+from volref.scene.radar_blocks import flag_bins, flag_radar
 from volref.stages.polar import polar_lookup, radar_table
 
 WIDTH, HEIGHT = 9, 7
@@ -123,6 +123,19 @@ def test_whatever_is_seen_lies_in_a_flagged_block_with_all_within_reach(seed, si
     around = around[:, inside.all(axis=0)]
     x, y, z = ((around - np.array(blocks.low)[:, None]) / np.array(blocks.size)[:, None]).astype(int)
     assert blocks.seen[z, y, x].all()
+
+
+@given(seed=st.integers(0, 10**6), size=st.sampled_from(SIZES), beam=st.sampled_from(BEAMS))
+def test_whatever_is_seen_lies_in_a_flagged_bin(seed, size, beam):
+    radar = spotted(seed, size, beam)
+    points = around_echoes(radar, np.random.default_rng(seed), 2000)
+    values, _ = polar_lookup(radar_table(radar), points)
+    bins = flag_bins(radar, lambda least, greatest: may_be_seen(table(), least, greatest))
+    within, _ = polar_lookup(radar_table(radar), points, bins)
+    shown = values > 5.0
+    np.testing.assert_array_equal(within[shown], values[shown])
+    known = ~np.isnan(within)
+    np.testing.assert_array_equal(within[known], values[known])
 
 
 @pytest.mark.parametrize("beam", BEAMS)

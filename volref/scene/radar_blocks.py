@@ -56,6 +56,25 @@ class RadarBlocks(NamedTuple):
     size: Vector
 
 
+class RadarBins(NamedTuple):
+    """Flags (S, A, J) of bins of range, each `ring` metres long, and azimuth, on and above each sweep."""
+
+    seen: Booleans
+    ring: float
+
+    def show(self, sweep: Indices, slant: Floats, azimuth: Floats) -> Booleans:
+        """Tell of points (n,) with `sweep` at or below them whether anything may be seen there.
+
+        Their slant ranges and azimuths (0 to 360) may be rounded: bins are a little wider than they say.
+        """
+        _, bearings, rings = self.seen.shape
+        place = sweep * bearings
+        place += (azimuth * (bearings / 360.0)).astype(np.intp)
+        place *= rings
+        place += np.minimum(slant * (1 / self.ring), rings - 1).astype(np.intp)
+        return np.asarray(self.seen.reshape(-1).take(place))
+
+
 class _Ranges(NamedTuple):
     """Least and greatest value (S, A, J) of what the gates of each sweep show in a bin; NaN: no data."""
 
@@ -124,6 +143,21 @@ def flag_radar(radar: RadarVolume, reach: float, flag: Flag) -> RadarBlocks:
     return RadarBlocks(seen.reshape(shape), _vector(low), _vector(size))
 
 
+def flag_bins(radar: RadarVolume, flag: Flag) -> RadarBins:
+    """Return the bins in which a value may be flagged, on a sweep or between it and the next one.
+
+    Examples
+    --------
+    >>> gates = np.array([[-np.inf] * 6 + [30.0, -np.inf]] * 4)
+    >>> radar = RadarVolume([Sweep([0, 90, 180, 270], e, gates, 500, 1000) for e in (0, 30)])
+    >>> flag_bins(radar, lambda low, high: high > 20).seen[0, 0].tolist()
+    [False, False, False, False, False, True, True, True]
+    """
+    layers = [flagged for _, _, flagged in _layers(radar, flag)]
+    sheets, pairs = layers[::2], [*layers[1::2], np.zeros_like(layers[0])]
+    return RadarBins(np.stack(sheets) | np.stack(pairs), _rings(radar)[1])
+
+
 def _vector(values: Floats) -> Vector:
     x, y, z = values.tolist()
     return x, y, z
@@ -161,18 +195,23 @@ def _layers(radar: RadarVolume, flag: Flag) -> Iterator[tuple[float, float, Bool
     sweeps, ranges = radar.sweeps, _ranges(radar)
     tilts = [(float(sweep.elevations.min()), float(sweep.elevations.max())) for sweep in sweeps]
     for s, (low, high) in enumerate(tilts):
-        yield low, high, _flagged(ranges.least[s], ranges.greatest[s], flag)
+        yield low, high, _flagged(ranges.least[s], ranges.greatest[s], radar.no_echo, flag)
         if s + 1 < len(sweeps):
             # NaN, and not flagged, where either has no data.
-            least, greatest = (
-                np.minimum(*ranges.least[s : s + 2]),
-                np.maximum(*ranges.greatest[s : s + 2]),
-            )
-            yield low, tilts[s + 1][1], _flagged(least, greatest, flag)
+            least = np.minimum(*ranges.least[s : s + 2])
+            greatest = np.maximum(*ranges.greatest[s : s + 2])
+            yield low, tilts[s + 1][1], _flagged(least, greatest, radar.no_echo, flag)
 
 
-def _flagged(least: Floats, greatest: Floats, flag: Flag) -> Booleans:
+def _flagged(least: Floats, greatest: Floats, no_echo: float | None, flag: Flag) -> Booleans:
+    """Return the flags of bins, of those without any echo, which are most, by asking once."""
     flags = ~np.isnan(least)
+    if no_echo is not None:
+        silent, nothing = (least == no_echo) & (greatest == no_echo), np.array([no_echo])
+        flags &= ~silent
+        flags[flags] = flag(least[flags], greatest[flags])
+        flags |= silent & flag(nothing, nothing)
+        return flags
     flags[flags] = flag(least[flags], greatest[flags])
     return flags
 

@@ -22,6 +22,7 @@ import numpy as np
 from volref.arrays import Booleans, Floats, Indices, Numbers
 from volref.scene.beams import azimuth_of, chord_of_world, elevation_of, widest_ring
 from volref.scene.radar import RadarVolume
+from volref.scene.radar_blocks import RadarBins
 from volref.scene.steps import Steps, steps_of
 from volref.scene.sweep import Sweep
 
@@ -132,11 +133,11 @@ def _joined_gates(radar: RadarVolume) -> Numbers:
     return joined
 
 
-def polar_lookup(table: RadarTable, points: Floats) -> tuple[Floats, Booleans]:
+def polar_lookup(table: RadarTable, points: Floats, bins: RadarBins | None = None) -> tuple[Floats, Booleans]:
     """Return the value (n,) at world points (3, n), NaN where there is nothing, and where there is something.
 
     The values lie within the radar's `value_bounds`; the error of the interpolation is a few ulp of the
-    larger of these.
+    larger of these.  Points in bins that are not flagged count as if there were nothing.
     """
     values = np.full(points.shape[1], np.nan)
     for begin in range(0, len(values), AT_ONCE):
@@ -144,11 +145,11 @@ def polar_lookup(table: RadarTable, points: Floats) -> tuple[Floats, Booleans]:
         x, y, z = (points[axis, part] - table.origin[axis] for axis in range(3))
         slant, ground, height = chord_of_world(x, y, z, table.beam)
         near = np.flatnonzero(_perhaps_seen(table, x, y, slant, height))
-        if near.size == len(x):
-            values[part] = _values_at(table, slant, azimuth_of(x, y), elevation_of(ground, height))
-        elif near.size:
+        if near.size < len(x):
             x, y, slant, ground, height = (array.take(near) for array in (x, y, slant, ground, height))
-            values[begin + near] = _values_at(table, slant, azimuth_of(x, y), elevation_of(ground, height))
+        values[begin + near] = _values_at(
+            table, slant, azimuth_of(x, y), elevation_of(ground, height), bins=bins
+        )
     return values, ~np.isnan(values)
 
 
@@ -205,11 +206,32 @@ def _perhaps_seen(table: RadarTable, x: Floats, y: Floats, slant: Floats, height
     return np.asarray(inside)
 
 
-def _values_at(table: RadarTable, slant: Floats, azimuth: Floats, elevation: Floats) -> Floats:
+def _values_at(
+    table: RadarTable,
+    slant: Floats,
+    azimuth: Floats,
+    elevation: Floats,
+    *,
+    bins: RadarBins | None = None,
+) -> Floats:
     azimuth, row = _folded(table, azimuth)
     low = _sweeps_below(table, row, azimuth, elevation)
-    below = low < 0
-    sweeps = np.stack((np.maximum(low, 0), np.minimum(low + 1, len(table.last) - 1)))
+    above = low >= 0
+    if bins is not None:
+        above &= bins.show(np.maximum(low, 0), slant, azimuth)
+    chosen, values = np.flatnonzero(above), np.full(len(slant), np.nan)
+    if chosen.size:
+        low, row = low.take(chosen), row.take(chosen)
+        slant, azimuth, elevation = (array.take(chosen) for array in (slant, azimuth, elevation))
+        values[chosen] = _above_sweeps(table, low, row, slant, azimuth, elevation)
+    return values
+
+
+def _above_sweeps(
+    table: RadarTable, low: Indices, row: Indices, slant: Floats, azimuth: Floats, elevation: Floats
+) -> Floats:
+    """Return the value (n,) on or above the sweeps `low` (n,)."""
+    sweeps = np.stack((low, np.minimum(low + 1, len(table.last) - 1)))
     before, after, share, tilts = _around(table, row + sweeps, azimuth)
     values = _on_sweeps(table, sweeps, (before, after), share, slant)
     tilt, rise = tilts[0], tilts[1] - tilts[0]
@@ -217,13 +239,12 @@ def _values_at(table: RadarTable, slant: Floats, azimuth: Floats, elevation: Flo
     share = above / np.where(rise > 0, rise, 1.0)
     # Above the highest sweep there is no other: the point is seen only if it lies on that one.
     highest = low == len(table.last) - 1
-    below |= highest & (above > ON)
     share[(np.abs(above) <= ON) | highest] = 0.0
     found = values[0] + share * (values[1] - values[0])
     # What contributes with weight 0 may be NaN.
     np.copyto(found, values[0], where=share == 0)
     np.clip(found, *table.bounds, out=found)
-    found[below] = np.nan
+    found[highest & (above > ON)] = np.nan
     return np.asarray(found)
 
 
