@@ -363,3 +363,15 @@ def test_the_depth_between_nodes_is_that_of_a_polynomial_and_can_be_far_off():
     image = integrate(vr.Scene(volume, transfer, camera, 1, 1), RIVALS["cell-gauss-2"], 1).rgba
     # the slope of the table at the knot is 1e4 to 1e6, the node off by an ulp
     assert image[0, 0, 0] == pytest.approx(50.0, abs=1e-8)
+
+
+def test_scenes_that_a_rival_would_draw_without_a_part_are_refused():
+    volume = rough_volume()
+    scene = vr.Scene(volume, colorful_transfer(), camera_towards(volume), 4, 3)
+    for change, words in (
+        ({"clip": [vr.Plane((0, 0, 0), (1, 0, 0))]}, "clipping planes"),
+        ({"lights": [vr.Light.headlight()]}, "a lit volume"),
+        ({"mode": "mip"}, "mode 'mip'"),
+    ):
+        with pytest.raises(vr.SceneError, match=f"up to an opaque surface for a study, got {words}"):
+            integrate(dataclasses.replace(scene, **change), RIVALS["trapezoid"], 0.5)

@@ -558,3 +558,11 @@ def test_the_gradient_of_the_cells_costs_one_order_and_sobels_none(gradient, ord
     errors = [sphere_error(count, SPHERE_VIEWS["side"], "lambert", gradient) for count in counts]
     found = -np.polyfit(np.log(np.array(counts) - 1), np.log(errors), 1)[0]
     assert found == pytest.approx(order, abs=0.25)
+
+
+def test_a_table_of_value_and_gradient_of_which_nothing_shows_is_drawn_and_traced():
+    table = vr.TransferFunction2D(np.zeros((2, 3, 4)), (0, 1), (0, 1))
+    scene = dataclasses.replace(sparse_scene(8, 6), transfer=table)
+    assert not vr.render(scene).rgba.any()
+    assert not vr.render(scene, plan=vr.plan(scene, method="march").everything()).rgba.any()
+    assert vr.trace(scene, (3, 3)).head["rgba"] == [0, 0, 0, 0]

@@ -9,6 +9,7 @@ import pytest
 
 import volref as vr
 from tests.scenes import rough_scene, sparse_scene
+from volref.phantoms import fields, transfer
 from volref.phantoms.meshes import sphere_mesh
 from volref.truth import crew, integration, rendering
 from volref.truth.choosing import Choice
@@ -186,3 +187,18 @@ def test_more_time_never_makes_a_bound_worse(scene, monkeypatch):
         bounds.append(out.bound)
     for less, more in pairwise(bounds):
         assert (more <= np.maximum(less, 1e-6)).all()
+
+
+def test_an_estimate_is_one_of_what_is_seen_where_the_volume_covers_little_of_the_image():
+    """Tiles that miss the volume say nothing of how far its estimates are off."""
+    volume = fields.gaussian_blobs()
+    low, high = volume.corners.min(axis=0), volume.corners.max(axis=0)
+    camera = vr.Camera.look_at(low + (high - low) * (4, -3, 2.5), (low + high) / 2, (0, 0, 1), 40, 1, 1e4)
+    scene = vr.Scene(volume, transfer.spiky(), camera, 160, 120)
+    truth = vr.render(scene, tolerance=1e-6)
+    seen = truth.rgba[..., 3] > 0
+    assert 0.01 < seen.mean() < 0.3
+    for tolerance in (0.02, 0.005):
+        out = vr.render(scene, tolerance=tolerance, certified=False)
+        off = np.abs(out.rgba - truth.rgba).max(axis=-1)
+        assert (off <= out.bound + 1e-6)[seen].mean() >= 0.999

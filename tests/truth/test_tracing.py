@@ -142,7 +142,7 @@ def test_what_a_trace_cannot_show_is_refused():
     glass = dataclasses.replace(scene.meshes[0], opacity=0.5)
     with pytest.raises(vr.SceneError, match=r"must be one volume up to a surface.*got transparent meshes"):
         vr.trace(dataclasses.replace(scene, meshes=[glass]), (6, 4))
-    with pytest.raises(vr.SceneError, match=r"in mode 'mip', got 'march'"):
+    with pytest.raises(vr.SceneError, match=r"up to a surface to be traced, got mode 'mip'"):
         vr.trace(dataclasses.replace(scene, mode="mip"), (6, 4))
 
 

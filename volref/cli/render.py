@@ -72,6 +72,10 @@ def _run(options: argparse.Namespace) -> int:
     _check_targets(targets, force=options.force)
     check_display(options)
     scene = read_scene(options)
+    if options.verify is not None:
+        from volref.truth.verification import check_verifiable
+
+        check_verifiable(scene)
     with executor_at(options.dask) as executor, progress("render", quiet=options.quiet) as show:
         out = draw(
             scene,
@@ -148,6 +152,8 @@ def _summary(out: "Render", outputs: list[str]) -> str:
 
 def _shortfall(out: "Render", max_seconds: float | None) -> str:
     """Say by how much the tolerance is missed, and what should meet it."""
+    from volref.planning import sampled_because
+
     largest, tolerance = float(out.bound.max()), out.plan.tolerance
     missed = int((out.bound > tolerance).sum())
     message = f"tolerance not met: error {largest:.3g} ({out.bound_kind}) above {tolerance:.3g} in {missed} "
@@ -155,13 +161,15 @@ def _shortfall(out: "Render", max_seconds: float | None) -> str:
     if max_seconds is not None and out.seconds >= max_seconds:
         return f"{message}; the time was up: raise --max-seconds or --tolerance"
     if not out.plan.step:
-        return f"{message}; float64 cannot tell more: raise --tolerance"
+        why = "float64 cannot tell more" if out.bound_kind == "certified" else "nothing can be refined"
+        return f"{message}; {why}: raise --tolerance"
     if out.plan.termination >= tolerance:
         return f"{message}; rays end at a transmittance of {out.plan.termination:g}: raise --tolerance"
     # The error falls with the square of the step.
     halvings = max(1, math.ceil(math.log(largest / tolerance, 4)))
     step = f"{out.plan.step / 2**halvings:.6g}"
-    return f"{message}; try --step {step}, or --method exact, or raise --tolerance"
+    exact = "" if sampled_because(out.plan.scene) else " or --method exact,"
+    return f"{message}; try --step {step},{exact} or raise --tolerance"
 
 
 VERB = Verb(

@@ -15,7 +15,7 @@ from volref.io.npy import npz_headers, read_npy
 from volref.io.png import read_png_header
 from volref.io.radar.door import holds_radar, load_radar
 from volref.io.readers import is_volume_path
-from volref.io.scene_parts import document_of_placement
+from volref.io.scene_parts import document_of_look, document_of_placement
 from volref.io.scenes import FORMAT as SCENE_FORMAT
 from volref.io.scenes import load_scene
 from volref.io.transfer import FORMAT as TRANSFER_FORMAT
@@ -139,7 +139,7 @@ def describe_scene(scene: Scene) -> dict[str, Any]:
         "width": scene.width,
         "height": scene.height,
         "camera": scene.camera.kind,
-        "background": list(scene.background),
+        **{key: value for key, value in document_of_look(scene).items() if value},
         "volume": None if scene.volume is None else describe_volume(scene.volume),
         "transfer": None if scene.transfer is None else describe_transfer(scene.transfer),
         "meshes": [describe_mesh(mesh) for mesh in scene.meshes],

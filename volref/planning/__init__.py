@@ -22,6 +22,7 @@ from volref.planning.choices import (
     may_be_seen,
     meshes_stage,
     missing_rays,
+    more_than_values,
     never_needed,
     precision_of,
     sampled_because,
@@ -46,6 +47,7 @@ __all__ = [
     "Plan",
     "Stage",
     "may_be_seen",
+    "more_than_values",
     "plan",
     "sampled_because",
 ]
@@ -161,7 +163,8 @@ def _stepless(scene: Scene, method: str, tolerance: float) -> Plan:
         seen = shows(scene)
         stages.append(volume_stage(scene, seen=seen))
         if seen:
-            stages.extend([missing_rays(scene), *cells_stages(scene)])
+            stages.append(missing_rays(scene))
+            stages.extend([] if sampled_because(scene) else cells_stages(scene))
             stages.extend([*light_stages(scene), *never_needed()])
     stages.append(background_stage(scene))
     return Plan(scene, method, 0.0, tolerance, 0.0, 0, None, tuple(stages))

@@ -1,6 +1,7 @@
 """The stages one by one: what the scene alone says of each, and what leaving it out saves."""
 
 import math
+from collections.abc import Sequence
 from functools import partial
 
 import numpy as np
@@ -118,6 +119,19 @@ def sampled_because(scene: Scene) -> str:
     if scene.needs_gradient and scene.mode == "composite":
         return "gradient opacity"
     return "" if scene.classification == "post" else f"classification {scene.classification!r}"
+
+
+def more_than_values(scene: Scene, modes: Sequence[str] = ("composite",)) -> str:
+    """Say what of a scene is more than values on a grid up to an opaque surface, in one of `modes`."""
+    if sampled_because(scene):
+        return sampled_because(scene)
+    if scene.mode not in modes:
+        return f"mode {scene.mode!r}"
+    if scene.lights_volume:
+        return "lights on an isosurface"
+    if scene.clip:
+        return "clipping planes"
+    return "transparent meshes" if any(mesh.transparent for mesh in scene.meshes) else ""
 
 
 def colour_stage(scene: Scene) -> tuple[Palette, Stage]:
@@ -297,6 +311,8 @@ def early_termination(scene: Scene) -> tuple[float, Stage]:
     """End rays early where their optical depth can be great enough."""
     name, volume = "early termination", scene.volume
     assert volume is not None
+    if scene.mode != "composite":
+        return 0.0, Stage(name, included=False, reason=f"mode {scene.mode!r} takes all of a ray")
     most = scene.envelope.most_extinction(*volume.value_bounds) * diagonal_of(scene)
     if most < -math.log(TERMINATION):
         reason = f"the optical depth of a ray cannot exceed {most:.3g}"

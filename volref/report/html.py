@@ -20,6 +20,7 @@ from volref.scene.camera import Camera
 from volref.scene.mesh import Mesh
 from volref.scene.radar import RadarVolume
 from volref.scene.scene import Scene
+from volref.scene.transfer2d import TransferFunction2D
 from volref.scene.volume import Volume
 from volref.truth.result import Render
 
@@ -80,11 +81,38 @@ def scene_rows(scene: Scene, unit: str = "world units") -> list[Row]:
     if scene.transfer is not None:
         knots, kind = scene.envelope.values, scene.envelope.interpolation
         span = f"{knots[0]:g} to {knots[-1]:g}"
-        rows.append(("transfer function", f"{len(knots)} knots from {span}, {kind} linear between them"))
+        words = f"{len(knots)} knots from {span}, {kind} linear between them"
+        if isinstance(scene.transfer, TransferFunction2D):
+            high, wide = scene.transfer.rgba.shape[:2]
+            words = f"{wide} values from {span} x {high} gradient magnitudes"
+        elif scene.transfer.gradient_opacity is not None:
+            words += "; times a factor by the gradient"
+        rows.append(("transfer function", words))
+    rows += _look_rows(scene)
     rows += [_mesh_row(i, mesh) for i, mesh in enumerate(scene.meshes)]
     rows += _camera_rows(scene.camera, unit)
     rows.append(("background", f"{_numbers(scene.background)} (premultiplied RGBA, working space)"))
     return rows
+
+
+def _look_rows(scene: Scene) -> list[Row]:
+    """Return what decides the look beside the table, as far as it is not the default."""
+    rows = [] if scene.mode == "composite" else [("mode", scene.mode)]
+    if scene.isovalue is not None:
+        rows.append(("isovalue", f"{scene.isovalue:g}"))
+    if scene.lights:
+        model = "phong" if scene.material is None else scene.material.model
+        rows.append(("lights", f"{', '.join(light.kind for light in scene.lights)}; {model}"))
+    if scene.needs_gradient:
+        rows.append(("gradient", scene.gradient))
+    if scene.classification != "post":
+        rows.append(("classification", scene.classification))
+    planes = [("slice plane", plane) for plane in (scene.slice_plane,) if plane is not None]
+    planes += [("clipping plane", plane) for plane in scene.clip]
+    return rows + [
+        (name, f"through {_numbers(plane.point.tolist())}, normal {_numbers(plane.normal.tolist())}")
+        for name, plane in planes
+    ]
 
 
 def version_rows() -> list[Row]:
@@ -114,7 +142,9 @@ def _volume_rows(volume: Volume | RadarVolume, unit: str) -> list[Row]:
 def _mesh_row(index: int, mesh: Mesh) -> Row:
     dropped = f", {mesh.dropped} without an area dropped" if mesh.dropped else ""
     words = f"{len(mesh.faces):,} triangles, {len(mesh.vertices):,} vertices{dropped}"
-    return f"mesh {index}", f"{words}; colour: {mesh.coloring}"
+    seen = f", opacity {mesh.opacity:g}" if mesh.opacity < 1 else ""
+    seen += ", lit" if mesh.lit else ""
+    return f"mesh {index}", f"{words}; colour: {mesh.coloring}{seen}"
 
 
 def _camera_rows(camera: Camera, unit: str) -> list[Row]:

@@ -13,14 +13,15 @@ import numpy as np
 from volref import planning
 from volref.arrays import Floats, Indices
 from volref.planning import MOST_DEFAULT_SEGMENTS, Plan
+from volref.scene.footprint import footprint
 from volref.scene.scene import Scene
 from volref.truth.exact import Prepared, integrate_pixels
 from volref.truth.fields import field_of
 from volref.truth.march import march_chunk
 from volref.workspace import Workspace
 
-# Tiles to try, pixels on a side, and at most this share of the image.
-TILES, SIDE, MOST_SHARE = 24, 8, 1 / 8
+# Tiles to try, pixels on a side, at most this share of where the volume may show, and at least so many.
+TILES, SIDE, MOST_SHARE, FEWEST_TILES = 24, 8, 1 / 2, 6
 
 # The estimate is scaled so that it holds for this share of the pixels tried, with this margin.
 HELD, MARGIN = 0.999, 2.0
@@ -81,6 +82,8 @@ def choose(scene: Scene, plan: Plan, prepared: Prepared, distance: Floats, behin
     on_tiles = distance[pixels], behind[pixels]
     many = np.tile(pixels, REPEATED)
     truth = integrate_pixels(scene, prepared, pixels, 0.0, *on_tiles, max(plan.tolerance * TRUER, 1e-12))
+    if not (truth.bound > 0).any():  # nothing was met that could tell how estimates relate to errors
+        return None
     started = time.perf_counter()
     integrate_pixels(scene, prepared, pixels, 0.0, *on_tiles, plan.tolerance)
     exactly = (time.perf_counter() - started) / len(pixels)
@@ -132,12 +135,16 @@ def around_each(estimate: Floats) -> Floats:
 
 
 def tiles_to_try(scene: Scene) -> Indices:
-    """Return the pixels (k, SIDE, SIDE) of tiles spread over the image."""
-    across, down = scene.width // SIDE, scene.height // SIDE
+    """Return the pixels (k, SIDE, SIDE) of tiles spread over where the volume may show.
+
+    None if that is small.
+    """
+    where = footprint(scene)
+    across, down = (where.right - where.left) // SIDE, (where.bottom - where.top) // SIDE
     count = min(TILES, int(across * down * MOST_SHARE))
-    if count == 0:
+    if count < FEWEST_TILES:
         return np.empty((0, SIDE, SIDE), np.intp)
     chosen = np.random.default_rng(0).choice(across * down, count, replace=False)
     y, x = np.divmod(chosen, across)
-    corner = (y * SIDE) * scene.width + x * SIDE
+    corner = (where.top + y * SIDE) * scene.width + where.left + x * SIDE
     return np.asarray(corner[:, None, None] + np.arange(SIDE)[:, None] * scene.width + np.arange(SIDE))

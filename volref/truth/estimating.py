@@ -54,7 +54,9 @@ def march_to_tolerance(scene: Scene, plan: Plan, canvas: Canvas, crew: Crew, whe
     scale = _scale(scene, marching, canvas, own)
     # What lies behind an early end is certain, and not to be scaled down with the rest.
     certain = marching.termination * max(integration.field.color_limit, *scene.background, 1.0)
-    canvas.bound[reached] = (_bound(scale, own, shape) + certain)[reached]
+    # Pixels that nothing was found in are as certain as their neighbours.
+    seen = _around(own, shape) > 0
+    canvas.bound[reached] = (_bound(scale, own, shape) + certain)[reached] * seen[reached]
     again = 0
     for _ in range(ROUNDS):
         left = reached & (canvas.bound > plan.tolerance)

@@ -78,6 +78,9 @@ def render_jittered(
         If an offset is not in 0 to 1, there are fewer images than frames, or `volref.render` refuses.
     """
     started = time.perf_counter()
+    if scene.mode != "composite":
+        message = f"scene.mode must be 'composite' to be jittered, got {scene.mode!r}; "
+        raise SceneError(message + "render it without start offsets")
     decided = decide(scene, plan, "march" if plan is None else "auto", step, tolerance)
     if decided.method != "march":
         message = f"plan must be one of method 'march' to be jittered, got {decided.method!r}; "
@@ -110,6 +113,7 @@ def render_jittered(
     reason = f"the mean of {count} frame{'s' * (count > 1)} with start offsets "
     reason += f"from seed {seed}" if given is None else "as given"
     stage = Stage("jitter", included=True, reason=reason)
+    others = (stage for stage in decided.stages if stage.name != "jitter")
     return dataclasses.replace(
         out,
         rgba=mean,
@@ -117,7 +121,7 @@ def render_jittered(
         bound_kind="estimate",
         seconds=time.perf_counter() - started,
         samples=samples,
-        plan=dataclasses.replace(decided, stages=(*decided.stages, stage)),
+        plan=dataclasses.replace(decided, stages=(*others, stage)),
     )
 
 

@@ -18,7 +18,8 @@ class Render:
     rgba
         The image (H, W, 4): premultiplied, in the working space, background included.
     distance
-        World distance (H, W) to the first opaque surface, +inf elsewhere.
+        World distance (H, W) to the first opaque surface or isosurface, +inf elsewhere, and where no time was
+        left to look for an isosurface.
     bound
         Error per pixel (H, W), the largest over the four channels.
     bound_kind
@@ -48,7 +49,7 @@ class Render:
         return bool(self.bound.max() <= self.plan.tolerance)
 
     def save(self, path: str | Path, *, encoding: str = "srgb", overwrite: bool = False) -> None:
-        """Write the image: .png for people, .npy the exact rgba, .npz rgba, distance and bound.
+        """Write the image: .png for people, .npy and .exr rgba, .npz rgba, distance and bound.
 
         `encoding` is for PNG only: "srgb" or "gamma2.2" for a linear working space, "none" to store its
         numbers as codes.

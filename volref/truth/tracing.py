@@ -94,11 +94,11 @@ def trace(
         If the pixel lies outside the image, an argument breaks a rule of `volref.plan`, or the scene has
         transparent meshes or another mode than "composite".
     """
+    _refuse_others(scene, plan)
     decided = decide(scene, plan, "march" if plan is None else "auto", step)
     if decided.method != "march":
         message = f"plan must be a march's, got method {decided.method!r}; make one with method='march'"
         raise SceneError(message)
-    _refuse_others(scene)
     x, y = _checked_pixel(scene, pixel)
     flat = np.array([y * scene.width + x])
     rays = pixel_rays(scene.camera, scene.width, scene.height, flat)
@@ -128,10 +128,11 @@ def _surface_words(surface: Surface | None, x: int, y: int) -> dict[str, Any] | 
     }
 
 
-def _refuse_others(scene: Scene) -> None:
-    """Refuse scenes of which one row of segments is not the whole ray."""
+def _refuse_others(scene: Scene, plan: Plan | None) -> None:
+    """Refuse scenes of which one row of segments is not the whole ray, and plans of other segments."""
     other = "" if scene.mode == "composite" else f"mode {scene.mode!r}"
     other = "transparent meshes" if any(mesh.transparent for mesh in scene.meshes) else other
+    other = "a plan with start offsets" if plan is not None and plan.offsets is not None else other
     if other:
         message = f"scene must be one volume up to a surface to be traced, got {other}; trace it without"
         raise SceneError(message)

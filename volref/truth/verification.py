@@ -14,8 +14,8 @@ import numpy as np
 
 from volref.arrays import Booleans, Floats, Indices, Integers, whole_number
 from volref.errors import SceneError
-from volref.planning import sampled_because
-from volref.scene.scene import Scene
+from volref.planning import more_than_values
+from volref.scene.scene import MODES, Scene
 from volref.scene.transform import transform_directions, transform_points
 from volref.stages.rays import pixel_rays
 from volref.truth.canvas import light_behind
@@ -211,17 +211,10 @@ def verify(
     SceneError
         If the scene has no volume, `out` has another size, a pixel lies outside, or mpmath is missing.
     """
-    _check_mpmath()
-    if scene.volume is None or scene.transfer is None:
-        message = "scene must have a volume to verify, got meshes only; compare their images instead"
+    check_verifiable(scene)
+    if more := next((name for name in ("supersampling", "jitter") if out.plan.includes(name)), ""):
+        message = f"out must hold one ray of each pixel to be verified, got {more}; render it again without"
         raise SceneError(message)
-    more = sampled_because(scene) or ("clipping planes" if scene.clip else "")
-    more = more or ("lights on an isosurface" if scene.lights_volume else "")
-    more = more or ("transparent meshes" if any(mesh.transparent for mesh in scene.meshes) else "")
-    more = more or next((name for name in ("supersampling", "jitter") if out.plan.includes(name)), "")
-    if more:
-        message = f"scene must show values on a grid as the table has them to be verified, got {more}; "
-        raise SceneError(message + "verify one without")
     size = scene.height, scene.width
     if out.rgba.shape[:2] != size:
         message = f"out must be an image of the scene, {size[1]} x {size[0]} pixels, got "
@@ -245,6 +238,23 @@ def verify(
         digits,
         time.perf_counter() - started,
     )
+
+
+def check_verifiable(scene: Scene) -> None:
+    """Refuse a scene whose image cannot be verified, before it is rendered.
+
+    Raises
+    ------
+    SceneError
+        If it has no volume or more than the other path knows, or mpmath is missing.
+    """
+    _check_mpmath()
+    if scene.volume is None or scene.transfer is None:
+        message = "scene must have a volume to verify, got meshes only; compare their images instead"
+        raise SceneError(message)
+    if more := more_than_values(scene, MODES):
+        message = f"scene must show values on a grid as the table has them to be verified, got {more}; "
+        raise SceneError(message + "verify one without")
 
 
 def _integrate_again(

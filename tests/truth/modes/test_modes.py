@@ -218,3 +218,25 @@ def test_modes_of_a_radar_are_sampled_and_their_estimate_holds():
     assert np.abs(surface.distance.reshape(-1)[hit] - expected).max() < 10
     level = vr.render(radar_scene("slice", slice_plane=vr.Plane((0, 0, 0), (0, 1, 0)))).rgba.reshape(-1, 4)
     assert np.abs(level[inside, 0] * 100 - 40 - nearest[inside] / 500).max() < 1e-9
+
+
+def test_the_bound_of_a_lit_isosurface_is_small_where_it_is_certain():
+    """Also where the isovalue lies between the knots of the table, whose colour is then rounded."""
+    lights = {"lights": [vr.Light.headlight()], "material": vr.Material("phong", diffuse=0.9)}
+    out = vr.render(ball_scene("isosurface", isovalue=-0.6123, **lights))
+    hit = np.isfinite(out.distance)
+    assert np.quantile(out.bound[hit], 0.9) < 1e-5
+    assert out.bound[~hit].max() == 0
+
+
+def test_offsets_are_for_composite_scenes():
+    scene = radar_scene("mip")
+    with pytest.raises(vr.SceneError, match=r"scene.mode must be 'composite' to be jittered, got 'mip'"):
+        vr.render_jittered(scene, 2)
+
+
+def test_the_plan_of_a_radar_mode_says_that_it_is_sampled():
+    names = {stage.name: stage for stage in vr.plan(radar_scene("mip")).stages}
+    assert "empty space" not in names or not names["empty space"].included
+    marched = {stage.name: stage for stage in vr.plan(radar_scene("mip"), method="march").stages}
+    assert not marched["early termination"].included

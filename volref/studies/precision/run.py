@@ -8,6 +8,7 @@ import numpy as np
 
 from volref.arrays import number, whole_number
 from volref.errors import SceneError
+from volref.planning import more_than_values
 from volref.scene.scene import Scene
 from volref.studies.precision.machine import this_machine
 from volref.studies.precision.methods import Answer, Method, chosen_methods, setting_words
@@ -78,6 +79,9 @@ def run_precision(
         if subject.scene.volume is None:
             message = f"scene {subject.name} must have a volume, got meshes only; "
             raise SceneError(message + "there is nothing to integrate")
+        if more := more_than_values(subject.scene):
+            message = f"scene {subject.name} must be one volume of values up to an opaque surface, got "
+            raise SceneError(message + f"{more}; leave it out")
     whole_number("runs", runs, low=1, high=1000)
     started = time.perf_counter()
     most = runs * sum(len(method.ladder) for method in wanted)

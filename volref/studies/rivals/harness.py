@@ -11,6 +11,7 @@ import numpy as np
 
 from volref.arrays import Floats, Indices
 from volref.errors import SceneError
+from volref.planning import more_than_values
 from volref.records import Surface
 from volref.scene.scene import Scene
 from volref.scene.transform import transform_directions, transform_points
@@ -89,6 +90,9 @@ def image_by(
     if scene.volume is None:
         message = "scene.volume must be given for a rival, got None; only a volume has something to integrate"
         raise SceneError(message)
+    if more := more_than_values(scene):
+        message = f"scene must be one volume of values up to an opaque surface for a study, got {more}; "
+        raise SceneError(message + "leave it out")
     started = time.perf_counter()
     medium = medium_of(scene)
     integrator = prepare(medium)

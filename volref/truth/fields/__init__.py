@@ -23,6 +23,6 @@ def field_of(scene: Scene, plan: Plan) -> Field:
         return preclassified_field(scene, plan)
     if scene.classification == "per-slice":
         return sliced_field(scene, plan)
-    if plan.includes("gradients"):
+    if scene.needs_gradient:
         return shaded_field(scene, plan)
     return plain_field(scene, plan)

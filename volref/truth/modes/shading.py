@@ -9,6 +9,8 @@ from volref.arrays import Floats
 from volref.planning import Plan
 from volref.records import Rays
 from volref.scene.scene import Scene
+from volref.scene.transform import transform_points
+from volref.stages.gradients import length_and_direction
 from volref.stages.lighting import lit_colors
 from volref.stages.sampling import PAD
 from volref.truth.fields.shaded import ShadedField, shaded_field
@@ -41,19 +43,17 @@ class LitSurface:
         change = np.maximum(*(np.abs(other - lit).max(axis=0) for other in beside))
         shaded, wider = rgba.copy(), bound.copy()
         shaded[met, :3] = lit.T
-        # Where it is not certain that a ray meets the surface, the contrast to what lies behind changes too.
-        wider[met] = np.where(bound[met] > 0, bound[met] + np.abs(lit - color).max(axis=0), 0.0) + change
+        # Where it is not certain that a ray meets the surface, its contrast to what lies behind is new too.
+        sure = np.isfinite(off)
+        wider[met] += np.where(sure[met], 0.0, np.abs(lit - color).max(axis=0)) + change
+        missed = np.flatnonzero(~sure & ~np.isfinite(hit))
+        wider[missed] = np.maximum(wider[missed], self._field.color_limit)
         return shaded, wider
 
     def _lit(self, rays: Rays, distance: Floats, colors: Floats) -> Floats:
         """Return the lit colours (3, R) of the points at a distance along rays."""
         field = self._field
         points = (rays.origins + distance[:, None] * rays.directions).T
-        matrix = field.space_from_world
-        position = np.stack(
-            [row[0] * points[0] + row[1] * points[1] + row[2] * points[2] + row[3] for row in matrix[:3]]
-        )
-        gradient = field.gradient_at(position + PAD, Workspace())
-        length = np.sqrt(gradient[0] ** 2 + gradient[1] ** 2 + gradient[2] ** 2)
-        normals = -gradient / np.where(length > 0, length, 1.0)
-        return lit_colors(field.lights, field.material, points, normals, -rays.directions.T, colors)
+        position = transform_points(field.space_from_world, points.T).T + PAD
+        _, upwards = length_and_direction(field.gradient_at(position, Workspace()))
+        return lit_colors(field.lights, field.material, points, -upwards, -rays.directions.T, colors)
