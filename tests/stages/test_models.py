@@ -11,7 +11,7 @@ from mpmath import mp, mpf
 from tests.scene.test_table import channels_at, tables
 from volref import TransferFunction
 from volref.scene.table import STRENGTH
-from volref.stages import models as column
+from volref.stages.models import columns as column
 from volref.stages.models import look_up, models_of, piece_of, rows_of
 
 U = 2.0**-53

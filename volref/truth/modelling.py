@@ -10,9 +10,9 @@ import numpy as np
 from volref.arrays import Booleans, Floats, Indices
 from volref.cubics import value_range
 from volref.records import Pieces
-from volref.stages import models as column
 from volref.stages.curved import LOGARITHM_LOSS, CurvedEmission, curved_emission
 from volref.stages.models import Models, rows_of
+from volref.stages.models import columns as column
 from volref.stages.quadrature import REACH, moments
 from volref.stages.radiance import Layout, Modelled, layout_of, sums_in_front
 
