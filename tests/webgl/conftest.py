@@ -1,0 +1,55 @@
+"""Real WebGL for the tests below: one browser for each implementation, open for the session."""
+
+import os
+from contextlib import ExitStack
+from pathlib import Path
+
+import pytest
+
+from tests.webgl.browser import IMPLEMENTATIONS, NotRunError
+from tests.webgl.engine import engine
+
+
+def pytest_collection_modifyitems(items):
+    """Mark every test of this folder `webgl`."""
+    for item in items:
+        if Path(__file__).parent in item.path.parents:
+            item.add_marker("webgl")
+
+
+@pytest.fixture(scope="session")
+def engine_of():
+    """Engine by name, opened at first use; where it cannot be had the test is not run, or fails in CI."""
+    kept = {}
+    with ExitStack() as closing:
+
+        def get(name):
+            if name not in kept:
+                try:
+                    kept[name] = closing.enter_context(engine(name))
+                except NotRunError as why:
+                    kept[name] = why
+            if isinstance(kept[name], NotRunError):
+                refuse = pytest.fail if os.environ.get("VOLREF_REQUIRE_WEBGL") == "1" else pytest.skip
+                refuse(f"not run: {kept[name]}")
+            return kept[name]
+
+        yield get
+
+
+@pytest.fixture(scope="session", params=("swiftshader", "llvmpipe"))
+def webgl(request, engine_of):
+    """Two implementations that share no code, in turn."""
+    return engine_of(request.param)
+
+
+@pytest.fixture(scope="session", params=IMPLEMENTATIONS)
+def every_webgl(request, engine_of):
+    """Each implementation in turn: for what differs between devices."""
+    return engine_of(request.param)
+
+
+@pytest.fixture(scope="session")
+def swiftshader(engine_of):
+    """The implementation that is part of Chromium."""
+    return engine_of("swiftshader")
