@@ -22,6 +22,8 @@ from volref.workspace import Workspace
 FILTERS = ("nearest", "linear")
 WRAPS = ("clamp", "repeat")
 
+PAD = 1  # layers added on each side
+
 
 @dataclass(frozen=True, eq=False)
 class Texture:
@@ -29,9 +31,12 @@ class Texture:
 
     texels: (H, W, C), or (D, H, W, C), floats, as a fetch gives them (decoded).
     filter, wrap: one of `FILTERS` and of `WRAPS`.
-    weight_bits: places are rounded to 2^-weight_bits of a texel; None: not at all.
+    weight_bits: places of linear fetches are rounded to 2^-weight_bits of a texel; None: not at all.
     result_bits: texels and the result of each interpolation, along x, then y, then z, are whole multiples of
-    1 / (2^result_bits - 1), as in Mesa, where both are 8; None: numbers.  It needs `weight_bits`.
+    1 / (2^result_bits - 1); it needs `weight_bits`, together at most 30.  None: not at all.
+    nearest_bits: coordinates of nearest fetches are cut to 2^-nearest_bits; None: not at all.
+
+    With 8-bit textures, Mesa has weight_bits and result_bits of 8, and SwiftShader nearest_bits of 16.
     """
 
     texels: Floats
@@ -39,6 +44,7 @@ class Texture:
     wrap: str = "clamp"
     weight_bits: int | None = None
     result_bits: int | None = None
+    nearest_bits: int | None = None
 
     @cached_property
     def sizes(self) -> tuple[int, ...]:
@@ -46,44 +52,44 @@ class Texture:
         return self.texels.shape[-2::-1]
 
     @cached_property
-    def corners(self) -> tuple[tuple[Numbers, ...], ...]:
-        """The flat texels of each channel from each corner of a cell on, so that one index fetches all.
-
-        One texel is added behind each axis, the one that is found there; an axis of one texel has no corners.
-        """
-        spatial = [axis for axis, size in enumerate(self.texels.shape[:-1]) if size > 1]
-        mode: Any = "edge" if self.wrap == "clamp" else "wrap"
-        pad = [(0, int(axis in spatial)) for axis in range(self.texels.ndim)]
-        padded = np.moveaxis(np.pad(self._numbers, pad, mode=mode), -1, 0)
-        channels = [np.ascontiguousarray(channel).reshape(-1) for channel in padded]
-        steps = [0]
-        for stride in self.strides[::-1]:
-            steps = [step + side for step in steps for side in (0, stride)] if stride else steps
-        return tuple(tuple(channel[step:] for step in steps) for channel in channels)
-
-    @cached_property
     def strides(self) -> tuple[int, ...]:
         """Steps of the flat index along x, y (and z); 0 where there is one texel."""
         strides, step = [], 1
         for size in self.sizes:
             strides.append(step if size > 1 else 0)
-            step *= size + 1 if size > 1 else 1
+            step *= size + 2 * PAD if size > 1 else 1
         return tuple(strides)
 
-    @property
-    def _numbers(self) -> Numbers:
-        """The texels, or their codes."""
-        if self.result_bits is None:
-            return self.texels
-        most = 2**self.result_bits - 1
-        return np.rint(np.clip(self.texels, 0.0, 1.0) * most).astype(np.int32)
+    @cached_property
+    def index_type(self) -> type[np.signedinteger[Any]]:
+        """What holds every flat index; int32 is twice as fast."""
+        return np.int32 if np.prod(np.add(self.sizes, 2 * PAD), dtype=np.int64) < 2**31 else np.int64
+
+    @cached_property
+    def corners(self) -> tuple[tuple[Numbers, ...], ...]:
+        """The flat texels of each channel from each corner of a cell on, so that one index fetches all.
+
+        Texels are padded by one layer of those found beyond the edge; an axis of one texel is not, and has no
+        corners.  They are codes where results are rounded.
+        """
+        numbers = self.texels
+        if self.result_bits is not None:
+            most = 2**self.result_bits - 1
+            numbers = np.rint(np.clip(self.texels, 0.0, 1.0) * most).astype(np.int32)
+        mode: Any = "edge" if self.wrap == "clamp" else "wrap"
+        pad = [(PAD * (size > 1),) * 2 for size in self.texels.shape[:-1]]
+        padded = np.moveaxis(np.pad(numbers, [*pad, (0, 0)], mode=mode), -1, 0)
+        steps = [0]
+        for stride in self.strides[::-1]:
+            steps = [step + side for step in steps for side in (0, stride)] if stride else steps
+        flat = [np.ascontiguousarray(channel).reshape(-1) for channel in padded]
+        return tuple(tuple(channel[step:] for step in steps) for channel in flat)
 
 
 def fetch(texture: Texture, coordinates: Sequence[Floats] | Floats, work: Workspace) -> Floats:
-    """Return the channels (C, n) of a texture at coordinates, which are left as they are.
+    """Return the channels (C, n) of a texture at coordinates, in a new array of the type of its texels.
 
     A linear fetch is evaluated as a + f (b - a) along x, then y, then z.  At a NaN it is that at 0.
-    The result lies in `work` until the next call.
 
     Examples
     --------
@@ -92,22 +98,15 @@ def fetch(texture: Texture, coordinates: Sequence[Floats] | Floats, work: Worksp
     [[0.0, 0.0, 0.5, 1.0]]
     """
     n = len(coordinates[0])
-    result: Floats = work.get("fetched", len(texture.corners) * n, texture.texels.dtype).reshape(-1, n)
-    if texture.filter == "nearest":
-        index = _nearest(texture, coordinates, work)
-        flat = texture.texels.reshape(-1, texture.texels.shape[-1])
-        for channel, out in enumerate(result):
-            np.take(flat[:, channel], index, out=out, mode="wrap")
-        return result
+    result = np.empty((len(texture.corners), n), texture.texels.dtype)
     index, weights = _cells(texture, coordinates, work)
-    if texture.result_bits is None:
-        for corners, out in zip(texture.corners, result, strict=True):
-            _interpolated(corners, index, weights, out, work)
-        return result
-    codes = work.get("codes", n, np.int32)
     for corners, out in zip(texture.corners, result, strict=True):
-        _interpolated_codes(texture, corners, index, weights, codes, work)
-        np.divide(codes, 2**texture.result_bits - 1, out=out, casting="unsafe")
+        if texture.result_bits is None:
+            _interpolate(corners, index, weights, out, work)
+        else:
+            codes = work.get("codes", n, np.int32)
+            _interpolate_codes(corners, index, weights, codes, texture.weight_bits or 0, work)
+            _decode(codes, texture.result_bits, out)
     return result
 
 
@@ -123,90 +122,85 @@ def fetch_slices(
     return values[:n], values[n:]
 
 
-def _nearest(texture: Texture, coordinates: Sequence[Floats] | Floats, work: Workspace) -> Numbers:
-    """Return the flat index of the texel in which each point lies."""
-    n, dtype = len(coordinates[0]), coordinates[0].dtype
-    index, whole, place = (
-        work.get("index", n, np.intp),
-        work.get("whole", n, np.int32),
-        work.get("place", n, dtype),
-    )
-    index[:] = 0
-    step = 1
-    for u, size in zip(coordinates, texture.sizes, strict=True):
-        _unit(texture, u, place)
-        np.multiply(place, dtype.type(size), out=place)
-        np.fmax(place, dtype.type(0), out=place)
-        np.minimum(place, dtype.type(size - 1), out=place)
-        np.copyto(whole, place, casting="unsafe")
-        np.multiply(whole, np.int32(step), out=whole)
-        np.add(index, whole, out=index)
-        step *= size
-    return index
-
-
-def _unit(texture: Texture, u: Floats, out: Floats) -> None:
-    """Write coordinates to `out`, brought to 0..1 if the texture repeats."""
-    if texture.wrap == "repeat":
-        with np.errstate(invalid="ignore"):
-            np.subtract(u, np.floor(u), out=out)
-    else:
-        np.copyto(out, u)
-
-
 def _cells(
     texture: Texture, coordinates: Sequence[Floats] | Floats, work: Workspace
 ) -> tuple[Numbers, list[Numbers]]:
     """Return the flat index (n,) of each point's lowest texel, and weights (n,) of the next along each axis.
 
-    Axes of one texel are left out.  Weights are in the type of the texels, or, where results are rounded,
-    whole numbers 0..2^weight_bits.
+    Axes of one texel are left out, and a nearest fetch has no weights.  Weights are in the type of the
+    texels, or, where results are rounded, whole numbers 0..2^weight_bits - 1.
     """
-    n, dtype = len(coordinates[0]), coordinates[0].dtype
-    base, whole = work.get("base", n, np.int32), work.get("whole", n, np.int32)
-    place, floor = work.get("place", n, dtype), work.get("floor", n, dtype)
-    base[:] = 0
+    n, linear = len(coordinates[0]), texture.filter == "linear"
+    base, whole = (work.get(name, n, texture.index_type) for name in ("base", "whole"))
+    base[:] = PAD * sum(texture.strides)
     weights = []
     for axis, (u, size, stride) in enumerate(zip(coordinates, texture.sizes, texture.strides, strict=True)):
         if not stride:
             continue
-        _unit(texture, u, place)
-        np.multiply(place, dtype.type(size), out=place)
-        np.subtract(place, dtype.type(0.5), out=place)
-        if texture.wrap == "repeat":
-            np.add(place, dtype.type(size), out=place, where=place < 0)
-        np.fmax(place, dtype.type(0), out=place)
-        np.minimum(place, dtype.type(size - (texture.wrap == "clamp")), out=place)
-        if texture.weight_bits is not None:
-            np.multiply(place, dtype.type(2**texture.weight_bits), out=place)
-            np.rint(place, out=place)
-            np.multiply(place, dtype.type(2.0**-texture.weight_bits), out=place)
-        np.copyto(whole, place, casting="unsafe")
-        np.copyto(floor, whole)
-        np.subtract(place, floor, out=place)
-        if texture.result_bits is not None:
-            assert texture.weight_bits is not None
-            weight = work.get(f"weight {axis}", n, np.int32)
-            np.multiply(place, 2**texture.weight_bits, out=weight, casting="unsafe")
+        place = work.get("place", n, u.dtype)
+        if linear:
+            weight = work.get(f"weight {axis}", n, np.int32 if texture.result_bits else texture.texels.dtype)
+            _place(texture, u, size, place, whole, weight, work)
+            weights.append(weight)
         else:
-            weight = work.get(f"weight {axis}", n, texture.texels.dtype)
-            np.copyto(weight, place, casting="same_kind")
-        weights.append(weight)
-        np.multiply(whole, np.int32(stride), out=whole)
+            np.multiply(_cut(texture, _held(texture, u, work), place), u.dtype.type(size), out=place)
+            np.copyto(whole, place, casting="unsafe")
+        if stride > 1:
+            np.multiply(whole, stride, out=whole)
         np.add(base, whole, out=base)
     index = work.get("index", n, np.intp)
     np.copyto(index, base)
     return index, weights
 
 
-def _interpolated(
+def _place(
+    texture: Texture, u: Floats, size: int, place: Floats, whole: Numbers, weight: Numbers, work: Workspace
+) -> None:
+    """Write the lower texel of each coordinate, -1..size - 1, to `whole`, and the next one's weight."""
+    number = u.dtype.type
+    np.multiply(_held(texture, u, work), number(size), out=place)
+    np.subtract(place, number(0.5), out=place)
+    bits = texture.weight_bits
+    if bits is not None:
+        np.multiply(place, number(2**bits), out=place)
+        np.rint(place, out=place)
+        np.multiply(place, number(2.0**-bits), out=place)
+    floor = work.get("floor", len(u), u.dtype)
+    np.floor(place, out=floor)
+    np.copyto(whole, floor, casting="unsafe")
+    np.subtract(place, floor, out=place)
+    if texture.result_bits is not None:
+        np.multiply(place, number(2 ** (bits or 0)), out=place)
+    np.copyto(weight, place, casting="unsafe")
+
+
+def _held(texture: Texture, u: Floats, work: Workspace) -> Floats:
+    """Return coordinates as they are if all are in 0..1, else as the texture brings them there."""
+    if u.size == 0 or (u.min() >= 0 and u.max() <= 1):
+        return u
+    held: Floats = work.get("held", len(u), u.dtype)
+    if texture.wrap == "repeat":
+        with np.errstate(invalid="ignore"):
+            np.subtract(u, np.floor(u), out=held)
+        u = held
+    np.fmax(u, u.dtype.type(0), out=held)  # also makes 0 of NaN
+    return np.minimum(held, u.dtype.type(1), out=held)
+
+
+def _cut(texture: Texture, u: Floats, out: Floats) -> Floats:
+    """Return coordinates in 0..1, cut to the bits of a nearest fetch."""
+    if texture.nearest_bits is None:
+        return u
+    np.multiply(u, u.dtype.type(2**texture.nearest_bits), out=out)
+    np.floor(out, out=out)
+    return np.multiply(out, u.dtype.type(2.0**-texture.nearest_bits), out=out)
+
+
+def _interpolate(
     corners: tuple[Numbers, ...], index: Numbers, weights: list[Numbers], out: Floats, work: Workspace
 ) -> None:
     """Write to `out` the interpolation of the 2^k corners found at `index` by k weights."""
-    n = len(index)
-    found = [out, *(work.get(f"corner {k}", n, out.dtype) for k in range(1, len(corners)))]
-    for corner, texel in zip(corners, found, strict=True):
-        np.take(corner, index, out=texel, mode="wrap")
+    found = _found(corners[: 2 ** len(weights)], index, out, work)
     for weight in weights:
         for low, high in zip(found[::2], found[1::2], strict=True):
             np.subtract(high, low, out=high)
@@ -215,28 +209,44 @@ def _interpolated(
         found = found[::2]
 
 
-def _interpolated_codes(
-    texture: Texture,
+def _interpolate_codes(
     corners: tuple[Numbers, ...],
     index: Numbers,
     weights: list[Numbers],
     out: Numbers,
+    bits: int,
     work: Workspace,
 ) -> None:
-    """Write to `out` the codes interpolated from codes: a + (f (b - a) + half >> weight_bits) each time."""
-    assert texture.weight_bits is not None
-    half = np.int32(2 ** (texture.weight_bits - 1))
-    found = [out, *(work.get(f"corner {k}", len(index), np.int32) for k in range(1, len(corners)))]
-    for corner, texel in zip(corners, found, strict=True):
-        np.take(corner, index, out=texel, mode="wrap")
+    """Write to `out` the codes interpolated from codes: a + (f (b - a) + half >> bits) each time."""
+    half = np.int32(1 << bits >> 1)
+    found = _found(corners[: 2 ** len(weights)], index, out, work)
     for weight in weights:
         for low, high in zip(found[::2], found[1::2], strict=True):
             np.subtract(high, low, out=high)
             np.multiply(high, weight, out=high)
             np.add(high, half, out=high)
-            np.right_shift(high, np.int32(texture.weight_bits), out=high)
+            np.right_shift(high, np.int32(bits), out=high)
             np.add(low, high, out=low)
         found = found[::2]
+
+
+def _found(corners: tuple[Numbers, ...], index: Numbers, out: Numbers, work: Workspace) -> list[Numbers]:
+    """Return the texels of corners, those of the first in `out`."""
+    found = [out, *(work.get(f"corner {k}", len(index), out.dtype) for k in range(1, len(corners)))]
+    for corner, texel in zip(corners, found, strict=True):
+        # mode="wrap" writes straight into `out`; "raise" would go through a buffer.
+        np.take(corner, index, out=texel, mode="wrap")
+    return found
+
+
+def _decode(codes: Numbers, bits: int, out: Floats) -> None:
+    """Write the numbers 0..1 of codes to `out`, as `volref.formats.decoded` does."""
+    most = 2**bits - 1
+    if out.dtype == np.float32:
+        np.copyto(out, codes, casting="unsafe")
+        np.multiply(out, np.float32(1 / most), out=out)
+    else:
+        np.divide(codes, most, out=out, casting="unsafe")
 
 
 def mip_chain(texels: Floats) -> list[Floats]:
@@ -274,7 +284,7 @@ def fetch_mipmapped(
     for k in np.unique(whole).tolist():
         here = np.flatnonzero(whole == k)
         points = [row[here] for row in coordinates]
-        low = fetch(chain[k], points, work).copy()
+        low = fetch(chain[k], points, work)
         high = fetch(chain[min(k + 1, len(chain) - 1)], points, work)
         result[:, here] = low + (level[here] - k).astype(low.dtype) * (high - low)
     return result
