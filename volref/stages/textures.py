@@ -114,12 +114,8 @@ def fetch_slices(
     texture: Texture, u1: Floats, v1: Floats, u2: Floats, v2: Floats, work: Workspace
 ) -> tuple[Floats, Floats]:
     """Return the first channel (n,) at (u1, v1) and at (u2, v2), as from two slices of an atlas."""
-    n = len(u1)
-    both = work.get("slices", 4 * n, u1.dtype).reshape(2, 2 * n)
-    for row, (first, second) in zip(both, ((u1, u2), (v1, v2)), strict=True):
-        row[:n], row[n:] = first, second
-    values = fetch(texture, both, work)[0]
-    return values[:n], values[n:]
+    # One after the other: buffers for both at once would not stay in the cache.
+    return fetch(texture, (u1, v1), work)[0], fetch(texture, (u2, v2), work)[0]
 
 
 def _cells(
