@@ -16,6 +16,11 @@ import importlib
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from volref.emulation.catalogue import pipelines
+    from volref.emulation.device import Device
+    from volref.emulation.passes import emulate
+    from volref.emulation.pipeline import Pipeline, load_pipeline
+    from volref.emulation.result import Emulation
     from volref.errors import FormatError, SceneError
     from volref.io import (
         AtlasLayout,
@@ -81,10 +86,13 @@ __all__ = [
     "AtlasLayout",
     "Camera",
     "Comparison",
+    "Device",
+    "Emulation",
     "FormatError",
     "Light",
     "Material",
     "Mesh",
+    "Pipeline",
     "Plan",
     "Plane",
     "RadarMap",
@@ -108,11 +116,13 @@ __all__ = [
     "dbz_transfer",
     "describe_file",
     "drag",
+    "emulate",
     "jitter_images",
     "load_camera",
     "load_jitter",
     "load_mesh",
     "load_meshes",
+    "load_pipeline",
     "load_preset",
     "load_radar",
     "load_raw",
@@ -121,6 +131,7 @@ __all__ = [
     "load_transfer",
     "load_volume",
     "oblique_slice",
+    "pipelines",
     "plan",
     "ppi",
     "read_image",
@@ -145,6 +156,11 @@ __all__ = [
 
 # Where the names live; those not listed are in volref.io.
 _HOMES = {
+    "volref.emulation.catalogue": ("pipelines",),
+    "volref.emulation.device": ("Device",),
+    "volref.emulation.passes": ("emulate",),
+    "volref.emulation.pipeline": ("Pipeline", "load_pipeline"),
+    "volref.emulation.result": ("Emulation",),
     "volref.errors": ("FormatError", "SceneError"),
     "volref.oracle.metrics": ("Comparison", "compare"),
     "volref.phantoms.transfer": ("dbz_transfer",),

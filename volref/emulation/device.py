@@ -1,0 +1,115 @@
+"""Devices: what differs from one machine to the next while the program stays the same.
+
+The numbers of the presets were measured on software implementations of WebGL; tests/webgl holds them to that.
+"""
+
+import json
+from dataclasses import dataclass
+from typing import Annotated, Any
+
+import numpy as np
+
+from volref.emulation.switches import Switches, Whole, Word
+from volref.errors import SceneError
+
+ARITHMETIC = {
+    "float64": "64 bits, what no GPU has",
+    "float32": "32 bits, highp",
+    "float16": "16 bits, mediump",
+}
+
+
+@dataclass(frozen=True)
+class Device(Switches):
+    """How one machine computes; the default is ideal but for the float32 that decides on counts of samples.
+
+    Examples
+    --------
+    >>> Device().control, Device.named("swiftshader").subpixel_bits
+    ('float32', 4)
+    """
+
+    name: str = "ideal"
+    values: Annotated[str, Word("arithmetic of colours, tables and sums", ARITHMETIC)] = "float64"
+    control: Annotated[str, Word("arithmetic of positions, lengths and counts", ARITHMETIC)] = "float32"
+    weight_bits: Annotated[
+        int | None,
+        Whole("fraction bits of a linear filter's weights in 8-bit textures (None: all)", low=1, high=24),
+    ] = None
+    result_bits: Annotated[
+        int | None,
+        Whole("bits to which a linear filter of 8-bit textures rounds (None: all)", low=1, high=24),
+    ] = None
+    subpixel_bits: Annotated[
+        int | None, Whole("fraction bits of a vertex's window position (None: all)", low=1, high=16)
+    ] = None
+    nan_stored: Annotated[str, Word("what an 8-bit target holds for NaN", {"zero": "0", "one": "255"})] = (
+        "zero"
+    )
+    mix: Annotated[
+        str, Word("how mix(x, y, a) is computed", {"difference": "x + (y - x) a", "sum": "x (1 - a) + y a"})
+    ] = "difference"
+    blend: Annotated[
+        str,
+        Word(
+            "how 8-bit targets blend",
+            {"float": "in floating point, rounded once", "integer": "product by product in whole numbers"},
+        ),
+    ] = "float"
+    fragment_position: Annotated[
+        str, Word("arithmetic of gl_FragCoord in WebGL 1, where it is mediump", ARITHMETIC)
+    ] = "float32"
+
+    @property
+    def values_type(self) -> type[np.floating[Any]]:
+        """The type of colours, tables and sums."""
+        return _TYPES[self.values]
+
+    @property
+    def control_type(self) -> type[np.floating[Any]]:
+        """The type of positions, lengths and counts."""
+        return _TYPES[self.control]
+
+    @classmethod
+    def named(cls, name: str) -> "Device":
+        """Return a preset: "ideal", "exact", "swiftshader", "llvmpipe", "lavapipe" or "mediump".
+
+        Raises
+        ------
+        SceneError
+            If there is none of that name.
+        """
+        if name not in PRESETS:
+            message = f"device must be a preset, got {name!r}; use one of {', '.join(PRESETS)}"
+            raise SceneError(message)
+        return PRESETS[name]
+
+    def to_json(self) -> str:
+        """Return the device as JSON text."""
+        return json.dumps({"format": "volref-device", "version": 1, **self.as_dict()}, indent=2) + "\n"
+
+
+_TYPES: dict[str, type[np.floating[Any]]] = {
+    "float64": np.float64,
+    "float32": np.float32,
+    "float16": np.float16,
+}
+
+PRESETS: dict[str, Device] = {
+    device.name: device
+    for device in (
+        Device(),
+        Device("exact", control="float64"),
+        Device("swiftshader", subpixel_bits=4, nan_stored="one"),
+        Device(
+            "llvmpipe",
+            weight_bits=8,
+            result_bits=8,
+            subpixel_bits=8,
+            blend="integer",
+            fragment_position="float16",
+        ),
+        Device("lavapipe", weight_bits=8, result_bits=8, subpixel_bits=8, mix="sum", blend="integer"),
+        Device("mediump", values="float16", control="float16", fragment_position="float16"),
+    )
+}

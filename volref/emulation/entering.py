@@ -1,0 +1,149 @@
+"""Where rays enter and leave the box: two passes over its faces, one pass, or a slab test.
+
+F fragments, R rays.  The coordinate targets of two passes are (H, W, 3), in the number format of the target.
+"""
+
+import numpy as np
+
+from volref.arrays import Floats, Indices
+from volref.emulation.box import CORNERS, Box
+from volref.emulation.device import Device
+from volref.emulation.paths import Ends, vector_length
+from volref.emulation.pipeline import Pipeline
+from volref.errors import SceneError
+from volref.formats import stored
+from volref.scene.camera import Camera
+from volref.scene.scene import Scene
+from volref.scene.transform import transform_directions, transform_points
+from volref.stages.raster import Fragments, depth_test, rasterize
+from volref.stages.rays import pixel_ndc, pixel_rays
+from volref.stages.spans import box_spans
+from volref.stages.textures import Texture, fetch
+from volref.workspace import Workspace
+
+
+def ends_of_rays(
+    scene: Scene, pipeline: Pipeline, box: Box, device: Device
+) -> tuple[Ends, dict[str, Floats]]:
+    """Return the ends of the rays of all pixels that the program draws, and its coordinate targets."""
+    if pipeline.rays.kind == "coordinates":
+        return _two_passes(scene, pipeline, box, device)
+    if pipeline.rays.kind == "front-face":
+        return _from_faces(scene, box, device), {}
+    return _slab(scene, pipeline, box, device), {}
+
+
+def faces(scene: Scene, box: Box, device: Device, cull: str) -> Fragments:
+    """Return the nearest fragments of the box's faces, their varyings the texture coordinates."""
+    fragments = rasterize(
+        box.clip_corners,
+        box.triangles,
+        CORNERS,
+        scene.width,
+        scene.height,
+        subpixel_bits=device.subpixel_bits,
+        cull=cull,
+        clip_z=scene.camera.clip_z,
+    )
+    seen = depth_test(fragments, scene.width * scene.height)
+    return Fragments(
+        fragments.pixel[seen],
+        fragments.triangle[seen],
+        fragments.window_z[seen],
+        fragments.inverse_w[seen],
+        fragments.varyings[:, seen],
+        fragments.front[seen],
+    )
+
+
+def _two_passes(scene: Scene, pipeline: Pipeline, box: Box, device: Device) -> tuple[Ends, dict[str, Floats]]:
+    front = faces(scene, box, device, "back")
+    targets = {"back_coordinates": _target(faces(scene, box, device, "front"), scene, pipeline, device)}
+    exits = _read(targets["back_coordinates"], front.pixel, scene, pipeline, device)
+    entries = front.varyings.astype(device.control_type)
+    if pipeline.rays.front == "target":
+        targets = {"front_coordinates": _target(front, scene, pipeline, device)} | targets
+        entries = _read(targets["front_coordinates"], front.pixel, scene, pipeline, device)
+    return Ends(front.pixel, entries, exits), targets
+
+
+def _target(fragments: Fragments, scene: Scene, pipeline: Pipeline, device: Device) -> Floats:
+    """Return a coordinate target (H, W, 3), cleared to 0."""
+    target = np.zeros((scene.height * scene.width, 3), device.control_type)
+    nan = 1.0 if device.nan_stored == "one" else 0.0
+    colors = fragments.varyings.T.astype(device.control_type)
+    target[fragments.pixel] = stored(colors, pipeline.rays.format, nan=nan)
+    return target.reshape(scene.height, scene.width, 3)
+
+
+def _read(target: Floats, pixel: Indices, scene: Scene, pipeline: Pipeline, device: Device) -> Floats:
+    """Return what a fragment reads of a target at its own place."""
+    if pipeline.rays.filter == "nearest":
+        return np.ascontiguousarray(target.reshape(-1, 3)[pixel].T)
+    kind = device.control_type
+    u = (pixel % scene.width + 0.5).astype(kind) / kind(scene.width)
+    v = (pixel // scene.width + 0.5).astype(kind) / kind(scene.height)
+    return fetch(Texture(target), (u, v), Workspace()).copy()
+
+
+def _from_faces(scene: Scene, box: Box, device: Device) -> Ends:
+    """Return rays away from the eye, from the front faces on, or from the eye if that is inside."""
+    eye = _eye(scene, box)
+    inside = eye is not None and bool(((eye > 0) & (eye < 1)).all())
+    fragments = faces(scene, box, device, "front" if inside else "back")
+    kind = device.control_type
+    at_face = fragments.varyings.astype(kind)
+    if eye is None:
+        along = transform_directions(box.texture_from_world, _forward(scene.camera)[None]).T
+        away = np.broadcast_to(along.astype(kind), at_face.shape)
+    else:
+        away = at_face - eye.astype(kind)[:, None]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        direction = away / vector_length(away)
+    start = (
+        np.broadcast_to(eye.astype(kind)[:, None], at_face.shape) if inside and eye is not None else at_face
+    )
+    return Ends(fragments.pixel, start, start + direction)
+
+
+def _eye(scene: Scene, box: Box) -> Floats | None:
+    """Return the eye (3,) in texture space, None for parallel rays."""
+    if scene.camera.is_parallel:
+        return None
+    return np.asarray(transform_points(box.texture_from_world, scene.camera.world_from_view[:3, 3]))
+
+
+def _forward(camera: Camera) -> Floats:
+    return np.asarray(-camera.world_from_view[:3, 2])
+
+
+def _slab(scene: Scene, pipeline: Pipeline, box: Box, device: Device) -> Ends:
+    pixels = np.arange(scene.width * scene.height)
+    origins, directions = _world_rays(scene, pipeline.rays.direction, pixels)
+    starts = transform_points(box.texture_from_world, origins).T
+    along = transform_directions(box.texture_from_world, directions).T
+    spans = box_spans(starts, along, np.zeros(3), np.ones(3))
+    hit = np.flatnonzero(spans.t_near < spans.t_far)
+    kind = device.control_type
+    near, far = ((starts[:, hit] + t[hit] * along[:, hit]).astype(kind) for t in (spans.t_near, spans.t_far))
+    return Ends(hit, near, far)
+
+
+def _world_rays(scene: Scene, rule: str, pixels: Indices) -> tuple[Floats, Floats]:
+    """Return origins and unit directions (R, 3) in the world; the volume is seen from the origin on."""
+    camera = scene.camera
+    rays = pixel_rays(camera, scene.width, scene.height, pixels)
+    if rule == "eye" or (rule == "unproject" and camera.is_parallel):
+        return rays.origins, rays.directions
+    if rule == "unproject":
+        share = rays.directions @ _forward(camera)
+        return rays.origins + rays.directions * (camera.near / share)[:, None], rays.directions
+    if camera.is_parallel:
+        message = "camera must be a perspective one for pipeline.rays.direction 'focal', got a parallel one; "
+        raise SceneError(message + "use a pipeline with 'eye'")
+    x, y = pixel_ndc(scene.width, scene.height, pixels).T
+    aspect = scene.width / scene.height if rule == "focal" else 1.0
+    focal = camera.clip_from_view(scene.width, scene.height)[1, 1]
+    view = np.stack([x * aspect, y, np.full_like(x, -focal)], axis=1)
+    directions = transform_directions(camera.world_from_view, view)
+    return rays.origins, directions / np.linalg.norm(directions, axis=1, keepdims=True)

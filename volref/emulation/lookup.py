@@ -1,0 +1,105 @@
+"""From positions in the box to colours and opacities: the textures of a program, sampled.
+
+n points; positions are (3, n), values (n,), colours (4, n): straight red, green, blue, and the table's alpha.
+"""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from volref.arrays import Floats
+from volref.emulation.device import Device
+from volref.emulation.pipeline import Pipeline
+from volref.emulation.slices import SlicePair, slice_pair
+from volref.emulation.uploads import Uploads, table_place, table_texture, volume_texture
+from volref.stages.textures import Texture, fetch, fetch_slices
+from volref.workspace import Workspace
+
+
+class Found(NamedTuple):
+    """What samples have found: values (n,), and colours (4, n)."""
+
+    value: Floats
+    color: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Textures:
+    """The textures of a program on a device, and how it samples them."""
+
+    pipeline: Pipeline
+    device: Device
+    volume: Texture
+    table: Texture
+    size: tuple[int, int, int]
+    tiles: tuple[int, int]
+
+
+def textures_of(uploads: Uploads, pipeline: Pipeline, device: Device) -> Textures:
+    """Return the textures of a program as a device samples them."""
+    volume, table = (make(uploads, pipeline, device) for make in (volume_texture, table_texture))
+    return Textures(pipeline, device, volume, table, uploads.size, uploads.tiles)
+
+
+def look_up(textures: Textures, position: Floats, work: Workspace) -> Found:
+    """Return what the program finds at positions."""
+    order = textures.pipeline.table.order
+    if textures.pipeline.volume.layout == "3d":
+        found = fetch(textures.volume, position, work)
+        if order == "pre":
+            return Found(found[3], found)
+        value = _value_of(textures, found)
+        return Found(value, classified(textures, value, work))
+    pair = slice_pair(textures.pipeline.volume, textures.size, textures.tiles, position)
+    if order == "per-slice":
+        return _per_slice(textures, pair, work)
+    if order == "pre" or textures.volume.texels.shape[-1] > 1:
+        one = fetch(textures.volume, (pair.u1, pair.v1), work).copy()
+        two = fetch(textures.volume, (pair.u2, pair.v2), work)
+        if order == "pre":
+            color = _between(textures, one, two, pair)
+            return Found(color[3], color)
+        value = _between(textures, _value_of(textures, one), _value_of(textures, two), pair)
+    else:
+        value = _between(textures, *fetch_slices(textures.volume, *pair[3:], work), pair)
+    return Found(value, classified(textures, value, work))
+
+
+def classified(textures: Textures, value: Floats, work: Workspace) -> Floats:
+    """Return the table's colour (4, n) of values (n,); the result lies in `work` until the next fetch."""
+    place = table_place(textures.pipeline.table, value)
+    half = work.get("half", len(place), place.dtype)
+    half.fill(0.5)
+    return fetch(textures.table, (place, half), work)
+
+
+def _value_of(textures: Textures, channels: Floats) -> Floats:
+    """Return the value (n,) that fetched channels stand for."""
+    if textures.pipeline.volume.format != "unorm16-split":
+        return np.asarray(channels[0])
+    high, low = channels
+    kind = channels.dtype.type
+    return np.asarray(high * kind(65280 / 65535) + low * kind(255 / 65535))
+
+
+def _per_slice(textures: Textures, pair: SlicePair, work: Workspace) -> Found:
+    values = [value.copy() for value in fetch_slices(textures.volume, *pair[3:], work)]
+    one = classified(textures, values[0], work).copy()
+    two = classified(textures, values[1], work)
+    return Found(_between(textures, values[0], values[1], pair), _between(textures, one, two, pair))
+
+
+def _between(textures: Textures, one: Floats, two: Floats, pair: SlicePair) -> Floats:
+    """Return mix(one, two, share) as the device computes it."""
+    if textures.pipeline.volume.between == "none":
+        return one
+    share = pair.share.astype(one.dtype, copy=False)
+    return mix(textures.device, one, two, share)
+
+
+def mix(device: Device, x: Floats, y: Floats, share: Floats) -> Floats:
+    """Return GLSL's mix(x, y, share) as the device computes it."""
+    if device.mix == "sum":
+        return np.asarray(x * (1 - share) + y * share)
+    return np.asarray(x + (y - x) * share)

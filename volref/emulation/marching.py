@@ -1,0 +1,260 @@
+"""The loop of a fragment shader: sample, accumulate, advance, one iteration for all rays at a time.
+
+R rays, n of them in the arrays of a walk.  Positions, lengths and counts are in the control type of the
+device, colours in its values type.  Rays that have ended are dropped from the arrays now and then; what is
+computed for them until then is not used.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NamedTuple, TypeAlias
+
+import numpy as np
+
+from volref.arrays import Booleans, Floats, Indices, Integers
+from volref.emulation.groups import Stepping
+from volref.emulation.lookup import Found, Textures, look_up, mix
+from volref.emulation.opacity import OpacityRule
+from volref.emulation.paths import Paths
+from volref.workspace import Workspace
+
+# Rays walked together: their arrays then stay in the second-level cache.
+CHUNK = 4096
+
+# Rays that have ended are dropped when they are more than this share.
+MOST_OVER = 0.2
+
+# A ray of a program without a cap ends here all the same: one whose length is NaN would walk for ever.
+LONGEST_LOOP = 1 << 16
+
+# Colours (4, n) of samples at positions (3, n) of rays (n,), in place of what the table found.
+Shader: TypeAlias = Callable[[Floats, Found, Indices], Floats]
+
+
+class Cut(NamedTuple):
+    """Opaque meshes as the loop sees them: depth at the entry, per step and of the surface, all (R,)."""
+
+    depth: Floats
+    step: Floats
+    surface: Floats
+    early: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Program:
+    """All that a loop needs: textures, opacity, paths, the place (R,) of the first sample in its step."""
+
+    textures: Textures
+    rule: OpacityRule
+    paths: Paths
+    offset: Floats
+    cut: Cut | None = None
+    shade: Shader | None = None
+
+
+class Marched(NamedTuple):
+    """Colour (3, R), alpha, sum of weighted table alpha, samples taken, and which rays met a mesh."""
+
+    color: Floats
+    alpha: Floats
+    weighted: Floats
+    samples: Integers
+    hit: Booleans
+
+
+@dataclass(frozen=True, eq=False)
+class Sample:
+    """One iteration, for those who look on: its number, its rays (n,), what they found and became.
+
+    position (3, n); opacity (n,), share (n,) of a whole step or None; color (3, n) and alpha (n,) after it.
+    """
+
+    number: int
+    ray: Indices
+    position: Floats
+    found: Found
+    opacity: Floats
+    share: Floats | None
+    color: Floats
+    alpha: Floats
+
+
+Observer: TypeAlias = Callable[[Sample], None]
+
+
+@dataclass(eq=False)
+class _Walk:
+    """What changes from iteration to iteration, of rays `ray` (n,)."""
+
+    ray: Indices
+    paths: Paths
+    offset: Floats
+    position: Floats
+    walked: Floats
+    color: Floats
+    alpha: Floats
+    weighted: Floats
+    over: Booleans
+
+
+def march(program: Program, observe: Observer | None = None) -> Marched:
+    """Return what the loop accumulates along all rays."""
+    count, kind = len(program.offset), program.textures.device.values_type
+    color, alpha, weighted = np.zeros((3, count), kind), np.zeros(count, kind), np.zeros(count, kind)
+    result = Marched(color, alpha, weighted, np.zeros(count, np.int64), np.zeros(count, np.bool_))
+    work = Workspace()
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        for first in range(0, count, CHUNK):
+            _run(program, np.arange(first, min(first + CHUNK, count)), result, work, observe)
+    return result
+
+
+def _run(program: Program, rays: Indices, result: Marched, work: Workspace, observe: Observer | None) -> None:
+    stepping = program.textures.pipeline.stepping
+    walk = _start(program, rays)
+    for number in range(stepping.cap or LONGEST_LOOP):
+        if not _left(walk, _ended_before(stepping, walk, number), number, result):
+            return
+        position, share = _place(program, walk, number)
+        if program.cut is not None:
+            _meet(program.cut, walk, number, result)
+        found = look_up(program.textures, position, work)
+        if program.shade is not None:
+            found = Found(found.value, program.shade(position, found, walk.ray))
+        opacity = program.rule.opacity(found.color[3], found.value, walk.ray, share)
+        _accumulate(program, walk, found.color, opacity)
+        if observe is not None:
+            seen = Sample(number, walk.ray, position, found, opacity, share, walk.color, walk.alpha)
+            observe(seen)
+        _advance(stepping, walk)
+        if not _left(walk, _ended_after(stepping, walk), number + 1, result):
+            return
+    _left(walk, np.ones_like(walk.over), stepping.cap or LONGEST_LOOP, result)
+
+
+def _start(program: Program, rays: Indices) -> _Walk:
+    paths, offset = program.paths.take(rays), program.offset[rays]
+    kind = program.textures.device.values_type
+    stepping = program.textures.pipeline.stepping
+    count = len(rays)
+    position, walked = paths.entry, np.zeros_like(paths.length)
+    if stepping.advance == "parameter":
+        walked = paths.step * offset
+    elif stepping.advance == "add":
+        position = paths.entry + paths.delta * offset
+    zeros = (np.zeros((3, count), kind), np.zeros(count, kind), np.zeros(count, kind))
+    return _Walk(rays, paths, offset, position, walked, *zeros, np.zeros(count, np.bool_))
+
+
+def _left(walk: _Walk, ended: Booleans, samples: int, result: Marched) -> bool:
+    """Put down the rays that have just ended, and tell whether any are left."""
+    new = ended & ~walk.over
+    if new.any():
+        _put_down(walk, new, samples, result)
+        walk.over |= new
+        share = np.count_nonzero(walk.over) / len(walk.over)
+        if share == 1.0:
+            return False
+        if share > MOST_OVER:
+            _drop(walk)
+    return True
+
+
+def _put_down(walk: _Walk, which: Booleans, samples: int, result: Marched) -> None:
+    ray = walk.ray[which]
+    result.color[:, ray] = walk.color[:, which]
+    result.alpha[ray], result.weighted[ray] = walk.alpha[which], walk.weighted[which]
+    result.samples[ray] = samples
+
+
+def _drop(walk: _Walk) -> None:
+    """Drop the rays that are over from the arrays."""
+    kept = np.flatnonzero(~walk.over)
+    walk.paths = walk.paths.take(kept)
+    for name in ("ray", "offset", "position", "walked", "color", "alpha", "weighted", "over"):
+        setattr(walk, name, np.take(getattr(walk, name), kept, axis=-1))
+
+
+def _ended_before(stepping: Stepping, walk: _Walk, number: int) -> Booleans:
+    """Tell which rays end before iteration `number`."""
+    paths, kind = walk.paths, walk.walked.dtype.type
+    if stepping.end == "count":
+        return np.asarray(number >= paths.count)
+    if stepping.end == "parameter":
+        return ~(walk.walked < 1)
+    if stepping.end == "length-left":
+        return ~(paths.length - walk.walked > 0)
+    if stepping.end == "length-before":
+        begin = kind(number) * paths.step
+        if stepping.last_step == "dropped":
+            return np.asarray(begin + paths.step > paths.length)
+        return ~(begin < paths.length)
+    return np.zeros(len(walk.ray), np.bool_)
+
+
+def _place(program: Program, walk: _Walk, number: int) -> tuple[Floats, Floats | None]:
+    """Return where the sample lies, and what share (n,) of a whole step it stands for; None: all of it."""
+    stepping, paths = program.textures.pipeline.stepping, walk.paths
+    kind = walk.walked.dtype.type
+    if stepping.advance == "add":
+        return walk.position, None
+    if stepping.advance == "parameter":
+        return mix(program.textures.device, paths.entry, paths.exit, walk.walked), None
+    share = None
+    if stepping.last_step == "partial" and stepping.end == "length-before":
+        left = paths.length - kind(number) * paths.step
+        share = np.minimum(left, paths.step) / paths.step
+    place = walk.offset if share is None else walk.offset * share
+    return paths.entry + paths.delta * (kind(number) + place), share
+
+
+def _advance(stepping: Stepping, walk: _Walk) -> None:
+    if stepping.advance == "add":
+        walk.position = walk.position + walk.paths.delta
+    if stepping.advance == "parameter" or stepping.end in ("length-after", "length-left"):
+        walk.walked = walk.walked + walk.paths.step
+
+
+def _ended_after(stepping: Stepping, walk: _Walk) -> Booleans:
+    """Tell which rays end after an iteration, by where they have got to or by their alpha."""
+    if stepping.end == "length-after":
+        ended: Booleans = np.asarray(walk.walked >= walk.paths.length)
+    elif stepping.end == "outside":
+        ended = np.any((walk.position > 1) | (walk.position < 0), axis=0)
+    elif stepping.end == "outside-above":
+        ended = np.any(walk.position > 1, axis=0)
+    else:
+        ended = np.zeros(len(walk.ray), np.bool_)
+    if stepping.opaque_at is not None:
+        threshold = walk.alpha.dtype.type(stepping.opaque_at)
+        opaque = walk.alpha > threshold if stepping.opaque_test == "above" else walk.alpha >= threshold
+        ended = np.logical_or(ended, opaque)
+    return ended
+
+
+def _meet(cut: Cut, walk: _Walk, number: int, result: Marched) -> None:
+    """End the rays that have reached a surface before the sample that they would take now."""
+    depth, step, surface = (part[walk.ray] for part in cut[:3])
+    at = depth + step * depth.dtype.type(number)
+    reached = (at - surface > -step if cut.early else at >= surface) & ~walk.over
+    result.hit[walk.ray[reached]] = True
+    _put_down(walk, reached, number, result)
+    walk.over |= reached
+
+
+def _accumulate(program: Program, walk: _Walk, color: Floats, opacity: Floats) -> None:
+    """Add samples of straight colour (4, n) and opacity (n,) to the walk."""
+    pipeline = program.textures.pipeline
+    light, rule = pipeline.lighting.factor, pipeline.accumulation.rule
+    kind = opacity.dtype.type
+    if rule == "reversed-over":
+        behind = (kind(1) - opacity) * walk.alpha
+        walk.color = color[:3] * opacity * kind(light) + walk.color * behind
+        walk.alpha = opacity + behind
+        return
+    weight = (kind(1) - walk.alpha) * opacity
+    shining = weight if light == 1.0 else weight * kind(light)
+    walk.color += color[:3] * shining
+    if pipeline.accumulation.alpha == "weighted":
+        walk.weighted += color[3] * weight
+    walk.alpha = walk.alpha + (opacity if rule == "add-alpha" else weight)

@@ -1,0 +1,75 @@
+"""From the opacity of the table to that of a sample: what the length of a step does to it.
+
+n samples.  L: the step's length in texture space, l: in the world, d0: the transfer's unit distance.
+
+    as-is        factor a
+    per-step     factor a / steps
+    per-length   factor a L
+    corrected    1 - (1 - a)^(factor l / d0)
+
+The second and third are corrected in first order only, for an opacity of 1 - e^(-a ...) about a ... .
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from volref.arrays import Floats, Indices
+from volref.emulation.box import Box
+from volref.emulation.device import Device
+from volref.emulation.paths import Paths
+from volref.emulation.pipeline import Pipeline
+from volref.scene.scene import Scene
+
+
+@dataclass(frozen=True, eq=False)
+class OpacityRule:
+    """A rule of a program for rays whose steps are known: `scale` (R,) or (1,) is its factor or exponent."""
+
+    source: str
+    corrected: bool
+    scale: Floats
+
+    def opacity(self, alpha: Floats, value: Floats, ray: Indices, share: Floats | None) -> Floats:
+        """Return the opacity (n,) of samples on rays `ray` (n,) whose step is `share` (n,) of a whole one."""
+        opacity = value if self.source == "value" else alpha
+        scale = self.scale if len(self.scale) == 1 else self.scale[ray]
+        if share is not None:
+            scale = scale * share.astype(opacity.dtype)
+        if not self.corrected:
+            return np.asarray(opacity * scale)
+        one = opacity.dtype.type(1)
+        return np.asarray(one - (one - opacity) ** scale)
+
+
+def opacity_rule(scene: Scene, pipeline: Pipeline, box: Box, paths: Paths, device: Device) -> OpacityRule:
+    """Return the rule of a program for rays."""
+    switches, kind = pipeline.opacity, device.values_type
+    factor = factor_of(scene, pipeline, box)
+    assert scene.transfer is not None
+    scale: Floats = np.array([factor])
+    if switches.rule == "per-step":
+        scale = scale / pipeline.stepping.steps
+    elif switches.rule == "per-length":
+        scale = factor * paths.texture_step
+    elif switches.rule == "corrected":
+        scale = factor * paths.world_step / scene.transfer.unit_distance
+    return OpacityRule(switches.source, switches.rule == "corrected", scale.astype(kind))
+
+
+def factor_of(scene: Scene, pipeline: Pipeline, box: Box) -> float:
+    """Return the factor of a program's opacity, one that suits the scene where the program names none.
+
+    That is the one with which a faint sample has the opacity of the scene's transfer function for a step
+    along a side of mean length; on a box with equal sides, for every ray whose steps are equally long.
+    """
+    switches, stepping = pipeline.opacity, pipeline.stepping
+    if switches.factor is not None:
+        return switches.factor
+    if switches.rule in ("as-is", "corrected"):
+        return 1.0
+    assert scene.transfer is not None
+    side = float(box.sides.mean()) / scene.transfer.unit_distance
+    if switches.rule == "per-step" and stepping.rule == "texture-length":
+        return side * stepping.steps * (stepping.length or 1.0 / stepping.steps)
+    return side

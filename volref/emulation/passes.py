@@ -1,0 +1,176 @@
+"""`emulate`: the conductor of an emulation, pass by pass.
+
+uploads --> coordinate targets --> ends of rays --> paths --> the loop --> fragment colours --> canvas
+                                                      ^
+                                        mesh targets -+
+"""
+
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from volref.arrays import Floats, float_array, whole_number
+from volref.emulation.box import Box, box_of
+from volref.emulation.canvas import cleared, draw, fragment_colors, mean_of_frames, store, tone_mapped
+from volref.emulation.catalogue import named
+from volref.emulation.device import Device
+from volref.emulation.entering import ends_of_rays
+from volref.emulation.lookup import Textures, textures_of
+from volref.emulation.marching import Marched, Program, march
+from volref.emulation.opacity import OpacityRule, opacity_rule
+from volref.emulation.paths import Ends, Paths, paths_of
+from volref.emulation.pipeline import Pipeline
+from volref.emulation.result import Emulation
+from volref.emulation.uploads import Uploads, uploads_of
+from volref.errors import SceneError
+from volref.scene.scene import Scene
+from volref.scene.volume import Volume
+
+
+def emulate(
+    scene: Scene,
+    pipeline: str | Pipeline,
+    device: str | Device | None = None,
+    jitter: ArrayLike | None = None,
+    frames: int = 1,
+) -> Emulation:
+    """Return what a GPU program draws of a scene, with every target on the way.
+
+    Parameters
+    ----------
+    pipeline
+        The name of a system in the catalogue, or a `Pipeline`.
+    device
+        The machine; the default is ideal arithmetic, but for the float32 that decides how many samples a ray
+        takes.  A name is a preset, see `Device.named`.
+    jitter
+        For programs with a start offset: numbers 0..1 of a step, (frames, H, W).  None is 0.
+    frames
+        Frames of which the running mean is shown.
+
+    Raises
+    ------
+    SceneError
+        If the scene holds what the program cannot draw, or an argument breaks a rule.
+
+    Examples
+    --------
+    >>> import volref as vr
+    >>> volume = vr.Volume(np.full((4, 4, 4), 255, np.uint8))
+    >>> transfer = vr.TransferFunction.from_opacity([0, 255], [(1, 1, 1)] * 2, [0, 0.5])
+    >>> camera = vr.Camera.look_at((1.5, 1.5, 9), (1.5, 1.5, 1.5), (0, 1, 0), 30, 1, 20)
+    >>> out = emulate(vr.Scene(volume, transfer, camera, 3, 3), "texture3d")
+    >>> out.rgba8[1, 1].tolist(), int(out.samples[1, 1])
+    ([239, 239, 239, 239], 8)
+    """
+    began = time.perf_counter()
+    program = named(pipeline) if isinstance(pipeline, str) else pipeline
+    machine = Device.named(device) if isinstance(device, str) else device or Device()
+    count = whole_number("frames", frames, low=1, high=1 << 20)
+    offsets = start_offsets(scene, program, jitter, count)
+    drawing = prepare(scene, program, machine)
+    passes = dict(drawing.targets)
+    mean = cleared(scene, program.output, machine)
+    for number, offset in enumerate(offsets, start=1):
+        marched = march(drawing.program(offset))
+        canvas = drawn(drawing, marched)
+        if program.output.mean_format is not None:
+            mean = mean_of_frames(mean, canvas, number, program.output, machine)
+            passes |= {"frame": canvas, "running_mean": mean}
+            canvas = store(tone_mapped(mean, program.output), program.output.format, machine)
+    passes["canvas"] = canvas
+    size = scene.height, scene.width
+    samples = np.zeros(size, np.int64)
+    samples.reshape(-1)[drawing.ends.pixel] = marched.samples
+    images = {name: _image(target, size) for name, target in passes.items()}
+    seconds = time.perf_counter() - began
+    return Emulation(images["canvas"], drawing.distance, images, samples, seconds, program, machine)
+
+
+@dataclass(frozen=True, eq=False)
+class Drawing:
+    """All that a program has in hand when its last pass begins; what `trace` and `accept` look into too.
+
+    targets: what it has drawn so far, by name.  distance: see `Emulation`.
+    """
+
+    scene: Scene
+    pipeline: Pipeline
+    device: Device
+    box: Box
+    uploads: Uploads
+    textures: Textures
+    ends: Ends
+    paths: Paths
+    rule: OpacityRule
+    targets: Mapping[str, Floats]
+    distance: Floats
+
+    def program(self, offset: Floats) -> Program:
+        """Return the loop for start offsets (H * W,)."""
+        kind = self.device.control_type
+        return Program(self.textures, self.rule, self.paths, offset[self.ends.pixel].astype(kind))
+
+
+def prepare(scene: Scene, pipeline: Pipeline, device: Device) -> Drawing:
+    """Return what the program has before its last pass.
+
+    Raises
+    ------
+    SceneError
+        If the scene holds what the program cannot draw.
+    """
+    check_drawable(scene, pipeline)
+    box, uploads = box_of(scene), uploads_of(scene, pipeline)
+    ends, targets = ends_of_rays(scene, pipeline, box, device)
+    paths = paths_of(ends, scene, pipeline, box, device)
+    rule = opacity_rule(scene, pipeline, box, paths, device)
+    distance = np.full((scene.height, scene.width), np.inf)
+    textures = textures_of(uploads, pipeline, device)
+    return Drawing(scene, pipeline, device, box, uploads, textures, ends, paths, rule, targets, distance)
+
+
+def drawn(drawing: Drawing, marched: Marched) -> Floats:
+    """Return the target (H * W, 4) of the last pass: the frame, or the canvas."""
+    output, device = drawing.pipeline.output, drawing.device
+    canvas = cleared(drawing.scene, output, device)
+    fragments = fragment_colors(marched, drawing.pipeline.accumulation)
+    if output.mean_format is None:
+        fragments = tone_mapped(fragments, output)
+    draw(canvas, drawing.ends.pixel, fragments, output, device)
+    return canvas
+
+
+def start_offsets(scene: Scene, pipeline: Pipeline, jitter: ArrayLike | None, frames: int) -> Floats:
+    """Return where in its first step each ray takes its first sample (frames, H * W)."""
+    size = frames, scene.height, scene.width
+    offsets = np.full(size, pipeline.stepping.offset)
+    if frames > 1 and pipeline.output.mean_format is None:
+        message = f"frames must be 1 for a pipeline that keeps no mean of frames, got {frames}; "
+        raise SceneError(message + "set pipeline.output.mean_format, or draw one frame")
+    if jitter is not None:
+        if not pipeline.stepping.jitter:
+            message = "jitter must be None for a pipeline that has none, got numbers; "
+            raise SceneError(message + "set pipeline.stepping.jitter, or leave it out")
+        offsets = offsets + float_array("jitter", jitter, size)
+    return offsets.reshape(frames, -1)
+
+
+def check_drawable(scene: Scene, pipeline: Pipeline) -> None:
+    """Refuse scenes that hold what no program here draws."""
+    if not isinstance(scene.volume, Volume):
+        message = f"scene.volume must be a Volume for pipeline {pipeline.name!r}, got "
+        message += f"{'none' if scene.volume is None else type(scene.volume).__name__}; "
+        raise SceneError(message + "give one, or resample the radar")
+    if scene.mode != "composite" or scene.clip:
+        got = "clipping planes" if scene.clip else f"mode {scene.mode!r}"
+        message = f"scene must be a composite without clipping planes to be emulated, got {got}; "
+        raise SceneError(message + "leave it out")
+
+
+def _image(target: Floats, size: tuple[int, int]) -> Floats:
+    """Return a target as (H, W, channels)."""
+    return target if target.ndim > 2 else target.reshape(*size, -1)

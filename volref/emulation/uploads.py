@@ -1,0 +1,204 @@
+"""What a program hands to the GPU before it draws: the volume and the table as textures.
+
+Arrays are as they are uploaded: codes (uint8) or floats, row 0 at v = 0.  An atlas with 2 tiles across, the
+first tile at v0 (left) and at v1 (right):
+
+    v = 1 +---+---+      v = 1 +---+---+
+          | 2 | 3 |            | 0 | 1 |      slice s lies in column s mod 2
+          +---+---+            +---+---+
+          | 0 | 1 |            | 2 | 3 |
+    v = 0 +---+---+      v = 0 +---+---+
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from volref.arrays import Floats, Numbers
+from volref.emulation.device import Device
+from volref.emulation.groups import TableTexture, VolumeTexture
+from volref.emulation.pipeline import Pipeline
+from volref.formats import codes_of, decoded, stored
+from volref.image import decode_srgb, encode_srgb
+from volref.scene.scene import Scene
+from volref.scene.transfer import TransferFunction
+from volref.scene.transfer2d import TransferFunction2D
+from volref.scene.volume import Volume
+from volref.stages.classify import classify, lookup_table, segment_opacity
+from volref.stages.lookup2d import lookup_2d
+from volref.stages.textures import Texture, fetch
+from volref.workspace import Workspace
+
+
+@dataclass(frozen=True, eq=False)
+class Uploads:
+    """The textures of a program, as it uploads them.
+
+    volume: (D, H, W, C) of a 3-D texture, or (H, W, C) of an atlas.  table: straight (rows, n, 4), colours
+    encoded where the texture decodes them.  domain: the values that 0 and 1 stand for.  size: voxels
+    (nx, ny, nz).  tiles: (across, down) of an atlas.
+    """
+
+    volume: Numbers
+    table: Numbers
+    domain: tuple[float, float]
+    size: tuple[int, int, int]
+    tiles: tuple[int, int]
+
+
+def uploads_of(scene: Scene, pipeline: Pipeline) -> Uploads:
+    """Return what the program uploads for a scene with a volume on a grid."""
+    assert isinstance(scene.volume, Volume)
+    assert scene.transfer is not None
+    domain = domain_of(scene, pipeline)
+    entries = baked_table(scene, pipeline.table, domain)
+    if pipeline.table.srgb:
+        entries[..., :3] = encode_srgb(entries[..., :3])
+    table = _as_uploaded(entries, pipeline.table.format)
+    # float64 from the start: the difference of two codes of a narrow type may not fit it.
+    unit = (scene.volume.values.astype(np.float64) - domain[0]) / (domain[1] - domain[0])
+    channels = unit[..., None]
+    if pipeline.table.order == "pre":
+        texture = Texture(np.asarray(_as_fetched(table, pipeline.table, np.float64)), pipeline.table.filter)
+        place = table_place(pipeline.table, unit.reshape(-1))
+        found = fetch(texture, (place, np.full_like(place, 0.5)), Workspace())
+        channels = np.moveaxis(found, 0, -1).reshape(*unit.shape, 4)
+    tiles = tiles_of(pipeline.volume, len(unit))
+    texels = _texels(channels, pipeline.volume.format)
+    if pipeline.volume.layout == "atlas":
+        texels = atlas_of(texels, pipeline.volume, tiles)
+    return Uploads(texels, table, domain, scene.volume.size, tiles)
+
+
+def domain_of(scene: Scene, pipeline: Pipeline) -> tuple[float, float]:
+    """Return the values that the textures hold as 0 and 1.
+
+    The pipeline's; else those of the outer knots of the transfer function, where they differ; else the least
+    and the greatest of the volume.
+    """
+    if pipeline.domain is not None:
+        return pipeline.domain
+    if isinstance(scene.transfer, TransferFunction2D):
+        return scene.transfer.value_domain
+    assert isinstance(scene.transfer, TransferFunction)
+    assert scene.volume is not None
+    for low, high in ((scene.transfer.values[0], scene.transfer.values[-1]), scene.volume.value_bounds):
+        if low < high:
+            return float(low), float(high)
+    return float(low), float(low) + 1.0
+
+
+def baked_table(scene: Scene, table: TableTexture, domain: tuple[float, float]) -> Floats:
+    """Return the transfer function as entries (rows, n, 4): straight colour, opacity of a unit distance.
+
+    Of a function of the value alone all rows are equal.  One of value and magnitude has its rows spread over
+    its own magnitudes.
+    """
+    n = table.size
+    share = (np.arange(n) + 0.5) / n if table.baked == "centers" else np.arange(n) / (n - 1)
+    values = domain[0] + (domain[1] - domain[0]) * share
+    transfer = scene.transfer
+    if isinstance(transfer, TransferFunction2D):
+        low, high = transfer.magnitude_domain
+        magnitudes = low + (high - low) * (np.arange(table.rows) + 0.5) / table.rows
+        colors, opacity = lookup_2d(transfer, np.tile(values, table.rows), np.repeat(magnitudes, n))
+    else:
+        assert transfer is not None
+        work = Workspace()
+        found, strength = classify(lookup_table(transfer, domain), values, work)
+        if transfer.interpolation == "extinction":
+            strength = segment_opacity(transfer, strength, transfer.unit_distance)
+        colors, opacity = np.tile(found, table.rows), np.tile(strength, table.rows)
+    entries = np.concatenate([colors, opacity[None]]).T.reshape(table.rows, n, 4)
+    if table.last_column == "empty":
+        entries[:, -1] = 0.0
+    return np.ascontiguousarray(entries)
+
+
+def tiles_of(volume: VolumeTexture, slices: int) -> tuple[int, int]:
+    """Return how many tiles an atlas has across and down.
+
+    Examples
+    --------
+    >>> tiles_of(VolumeTexture(), 10), tiles_of(VolumeTexture(tiles_across=2), 5)
+    ((4, 3), (2, 3))
+    """
+    across = volume.tiles_across or math.isqrt(slices - 1) + 1
+    return across, -(-slices // across)
+
+
+def atlas_of(slices: Numbers, volume: VolumeTexture, tiles: tuple[int, int]) -> Numbers:
+    """Return slices (nz, ny, nx, C) as an atlas (H, W, C); tiles without a slice are 0."""
+    across, down = tiles
+    pad = ((0, 0), (volume.padding,) * 2, (volume.padding,) * 2, (0, 0))
+    padded = np.pad(slices, pad, mode="edge")
+    if volume.rows == "against-v":
+        padded = padded[:, ::-1]
+    count, height, width, channels = padded.shape
+    grid = np.zeros((down, across, height, width, channels), padded.dtype)
+    grid.reshape(-1, height, width, channels)[:count] = padded
+    if volume.first_tile == "v1":
+        grid = grid[::-1]
+    return np.ascontiguousarray(grid.swapaxes(1, 2)).reshape(down * height, across * width, channels)
+
+
+def volume_texture(uploads: Uploads, pipeline: Pipeline, device: Device) -> Texture:
+    """Return the volume's texture as a device samples it."""
+    texels = decoded_or(uploads.volume, device.values_type)
+    return _texture(texels, pipeline.volume.filter, device, narrow=uploads.volume.dtype == np.uint8)
+
+
+def table_texture(uploads: Uploads, pipeline: Pipeline, device: Device) -> Texture:
+    """Return the table's texture as a device samples it, without mip levels."""
+    texels = _as_fetched(uploads.table, pipeline.table, device.values_type)
+    kind = "nearest" if pipeline.table.filter == "nearest" else "linear"
+    return _texture(texels, kind, device, narrow=uploads.table.dtype == np.uint8 and not pipeline.table.srgb)
+
+
+def _texture(texels: Floats, kind: str, device: Device, *, narrow: bool) -> Texture:
+    weight_bits, result_bits = (device.weight_bits, device.result_bits) if narrow else (None, None)
+    return Texture(texels, kind, weight_bits=weight_bits, result_bits=result_bits)
+
+
+def table_place(table: TableTexture, values: Floats) -> Floats:
+    """Return where values of 0..1 are looked up, in their own type.
+
+    A table of n texels holds entry k at (k + 1/2) / n: looked up "direct", 0 and 1 lie half a texel outside
+    the outer entries; "centered", upon them.
+
+    Examples
+    --------
+    >>> table_place(TableTexture(size=4, coordinate="centered"), np.array([0.0, 1.0])).tolist()
+    [0.125, 0.875]
+    """
+    if table.coordinate == "direct":
+        return values
+    kind = values.dtype.type
+    return np.asarray((values * kind(table.size - 1) + kind(0.5)) / kind(table.size))
+
+
+def decoded_or(texels: Numbers, kind: np.typing.DTypeLike) -> Floats:
+    """Return texels as numbers of a type: codes decoded, floats as they are."""
+    return decoded(texels, kind) if texels.dtype.kind == "u" else texels.astype(kind, copy=False)
+
+
+def _as_fetched(table: Numbers, switches: TableTexture, kind: np.typing.DTypeLike) -> Floats:
+    """Return a table's texels (1 or more rows, n, 4) as a fetch gives them."""
+    texels = decoded_or(table, kind)
+    if switches.srgb:
+        texels = texels.copy()
+        texels[..., :3] = decode_srgb(texels[..., :3].astype(np.float64)).astype(kind)
+    return texels
+
+
+def _as_uploaded(entries: Floats, kind: str) -> Numbers:
+    return codes_of(entries, 8) if kind == "unorm8" else stored(entries, kind)
+
+
+def _texels(channels: Floats, kind: str) -> Numbers:
+    """Return channels (nz, ny, nx, C) as texels; 16 bits in two channels: first the high byte."""
+    if kind != "unorm16-split":
+        return _as_uploaded(channels, kind)
+    codes = codes_of(channels, 16)
+    return np.concatenate([codes >> 8, codes & 255], axis=-1).astype(np.uint8)
