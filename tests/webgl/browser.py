@@ -12,10 +12,11 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from importlib.util import find_spec
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
 
-if TYPE_CHECKING:
-    from playwright.sync_api import Page
+Call = Callable[[str, str], Any]
 
 # Software drivers are on Chromium's block list; a slow shader is not a hung one.
 FLAGS = (
@@ -39,9 +40,9 @@ LAUNCH_MILLISECONDS = 120_000
 JOB_SECONDS = 600
 
 RENDERER = """() => {
-    const gl = document.createElement("canvas").getContext("webgl2");
+    const gl = document.createElement("canvas").getContext("webgl");
     const named = gl && gl.getExtension("WEBGL_debug_renderer_info");
-    return named ? gl.getParameter(named.UNMASKED_RENDERER_WEBGL) : "no WebGL 2 at all";
+    return named ? gl.getParameter(named.UNMASKED_RENDERER_WEBGL) : "nothing at all";
 }"""
 
 
@@ -66,8 +67,8 @@ class NotRunError(Exception):
 
 
 @contextmanager
-def opened(name: str) -> Iterator[Callable[[str, Any], Any]]:
-    """Keep a browser open, and give the function that calls a JavaScript function of its one page.
+def opened(name: str) -> Iterator[Call]:
+    """Keep a browser open, and give what calls a JavaScript function of its one page with a text.
 
     Playwright's event loop counts as running in the thread that started it for as long as the browser is
     open, and `asyncio.run` would refuse to start there.  So the browser has a thread of its own.
@@ -77,21 +78,14 @@ def opened(name: str) -> Iterator[Callable[[str, Any], Any]]:
     NotRunError
         If Playwright, Chromium or the implementation is not there.
     """
-    implementation = IMPLEMENTATIONS[name]
     executable = _chromium()
-    with ThreadPoolExecutor(1, thread_name_prefix=name) as thread, ExitStack() as closing:
-        page = thread.submit(_page, closing, executable, implementation).result()
-        closing_in_its_thread = closing.pop_all()
+    with ThreadPoolExecutor(1, thread_name_prefix=name) as thread:
+        closing = ExitStack()
         try:
-            renderer = thread.submit(page.evaluate, RENDERER).result(JOB_SECONDS)
-            if not re.search(implementation.renderer, renderer):
-                message = (
-                    f"{name} was asked for, drawn by {renderer}; apt-get install {implementation.packages}"
-                )
-                raise NotRunError(message)
-            yield lambda script, given: thread.submit(page.evaluate, script, given).result(JOB_SECONDS)
+            call = thread.submit(_started, closing, executable, name).result()
+            yield lambda function, text: thread.submit(call, function, text).result(JOB_SECONDS)
         finally:
-            thread.submit(closing_in_its_thread.close).result(JOB_SECONDS)
+            thread.submit(closing.close).result(JOB_SECONDS)
 
 
 def _chromium() -> str:
@@ -106,16 +100,32 @@ def _chromium() -> str:
     return found
 
 
-def _page(closing: ExitStack, executable: str, implementation: Implementation) -> "Page":
+def _started(closing: ExitStack, executable: str, name: str) -> Call:
     from playwright.sync_api import sync_playwright
 
-    playwright = closing.enter_context(sync_playwright())
-    browser = playwright.chromium.launch(
+    implementation = IMPLEMENTATIONS[name]
+    folder = Path(closing.enter_context(TemporaryDirectory(prefix="volref-webgl-")))
+    browser = closing.enter_context(sync_playwright()).chromium.launch(
         executable_path=executable,
-        headless=True,
         args=[*FLAGS, implementation.flag],
         env={**os.environ, **ENVIRONMENT},
         timeout=LAUNCH_MILLISECONDS,
     )
     closing.callback(browser.close)
-    return browser.new_page()
+    page = browser.new_page()
+    renderer = page.evaluate(RENDERER)
+    if not re.search(implementation.renderer, renderer):
+        message = f"{name} was asked for, drawn by {renderer}; apt-get install {implementation.packages}"
+        raise NotRunError(message)
+    page.set_content("<input type=file>")
+
+    # Chromium reads a file ten times as fast as Playwright carries a message of some megabytes.
+    def call(function: str, text: str) -> Any:
+        file = folder / "text"
+        file.write_text(text, encoding="utf-8")
+        page.set_input_files("input", file)
+        return page.evaluate(
+            f"async () => ({function})(await document.querySelector('input').files[0].text())"
+        )
+
+    return call

@@ -1,4 +1,4 @@
-// The part of the engine that runs in the page: `runJob` takes a job as `engine.py` writes it and returns
+// The part of the engine that runs in the page: `runJob` takes a job as `engine.py` writes it, JSON, and returns
 // {pixels: {target: base64, rows from the bottom}} or {error: one text}.  Everything a pass depends on is set
 // by the pass, so no job sees what another one left behind.
 "use strict";
@@ -42,10 +42,12 @@
   };
 
   const ARRAYS = { UNSIGNED_BYTE: Uint8Array, FLOAT: Float32Array, HALF_FLOAT: Uint16Array, HALF_FLOAT_OES: Uint16Array };
-  const HALF_FLOAT_OES = 0x8d61;
+  // The one constant of WebGL 1 that belongs to an extension.
+  const codeOf = (gl, type) => (type === "HALF_FLOAT_OES" ? 0x8d61 : gl[type]);
 
   const contexts = {};
 
+  const mapped = (table, make) => Object.fromEntries(Object.entries(table).map(([k, v]) => [k, make(k, v)]));
   const decoded = (text) => Uint8Array.fromBase64(text).buffer;
   const encoded = (array) => new Uint8Array(array.buffer).toBase64();
 
@@ -125,9 +127,8 @@
     gl.pixelStorei(gl.UNPACK_PREMULTIPLY_ALPHA_WEBGL, false);
     gl.pixelStorei(gl.UNPACK_COLORSPACE_CONVERSION_WEBGL, gl.NONE);
     const values = new ARRAYS[type](decoded(data));
-    const typeCode = type === "HALF_FLOAT_OES" ? HALF_FLOAT_OES : gl[type];
     const load = size.length === 3 ? "texImage3D" : "texImage2D";
-    gl[load](kind, 0, gl[internal], ...size, 0, gl[external], typeCode, values);
+    gl[load](kind, 0, gl[internal], ...size, 0, gl[external], codeOf(gl, type), values);
     setSampling(gl, kind, filter);
     check(gl, `texture ${name} was uploaded`);
     return { kind, texture };
@@ -139,8 +140,7 @@
     const made = { kind: gl.TEXTURE_2D, texture: gl.createTexture(), framebuffer: gl.createFramebuffer() };
     gl.activeTexture(gl.TEXTURE0);
     gl.bindTexture(gl.TEXTURE_2D, made.texture);
-    const typeCode = type === "HALF_FLOAT_OES" ? HALF_FLOAT_OES : gl[type];
-    gl.texImage2D(gl.TEXTURE_2D, 0, gl[internal], width, height, 0, gl[external], typeCode, null);
+    gl.texImage2D(gl.TEXTURE_2D, 0, gl[internal], width, height, 0, gl[external], codeOf(gl, type), null);
     setSampling(gl, gl.TEXTURE_2D, filter);
     gl.bindFramebuffer(gl.FRAMEBUFFER, made.framebuffer);
     gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, made.texture, 0);
@@ -164,12 +164,11 @@
       gl.bufferData(kind, decoded(data), gl.STATIC_DRAW);
       return buffer;
     };
-    const made = { count, attributes: {}, buffers: [] };
-    for (const [name, { size, data }] of Object.entries(attributes)) {
-      made.attributes[name] = { size, buffer: filled(gl.ARRAY_BUFFER, data) };
-    }
-    made.indices = filled(gl.ELEMENT_ARRAY_BUFFER, indices);
-    return made;
+    return {
+      count,
+      attributes: mapped(attributes, (_, { size, data }) => ({ size, buffer: filled(gl.ARRAY_BUFFER, data) })),
+      indices: filled(gl.ELEMENT_ARRAY_BUFFER, indices),
+    };
   }
 
   function setUniforms(gl, program, values, textures) {
@@ -177,8 +176,9 @@
     for (let i = 0; i < gl.getProgramParameter(program, gl.ACTIVE_UNIFORMS); i++) {
       const { name: declared, type } = gl.getActiveUniform(program, i);
       const name = declared.replace(/\[0\]$/, "");
-      const value = values[name];
-      if (value === undefined) throw new Error(`uniform ${name} is not set`);
+      const given = values[name];
+      if (given === undefined) throw new Error(`uniform ${name} is not set`);
+      const value = given.numbers ? Array.from(new Float64Array(decoded(given.numbers))) : given;
       const place = gl.getUniformLocation(program, declared);
       if (type === gl.SAMPLER_2D || type === gl.SAMPLER_3D) {
         if (!textures[value]) throw new Error(`uniform ${name}: no texture or target ${value}`);
@@ -251,11 +251,10 @@
 
   function run(job, context, held) {
     const { gl } = context;
-    const entries = (table, make) => Object.fromEntries(Object.entries(table).map(([k, v]) => [k, make(k, v)]));
     gl.canvas.width = job.width;
     gl.canvas.height = job.height;
-    held.textures = entries(job.textures, (name, given) => upload(context, name, given));
-    held.targets = entries(job.targets, (name, given) => makeTarget(context, name, given));
+    held.textures = mapped(job.textures, (name, given) => upload(context, name, given));
+    held.targets = mapped(job.targets, (name, given) => makeTarget(context, name, given));
     held.geometries = job.geometries.map((given) => makeGeometry(gl, given));
     const canvas = { framebuffer: null, width: job.width, height: job.height, read: "UNSIGNED_BYTE" };
     const targets = { canvas, ...held.targets };
@@ -263,6 +262,7 @@
     job.passes.forEach((pass, i) => {
       const program = programOf(context, pass.program);
       const target = targets[pass.target];
+      if (!target) throw new Error(`pass ${i}: no target ${pass.target}`);
       gl.bindFramebuffer(gl.FRAMEBUFFER, target.framebuffer);
       gl.viewport(0, 0, target.width, target.height);
       gl.useProgram(program);
@@ -290,7 +290,8 @@
     while (gl.getError() !== gl.NO_ERROR && !gl.isContextLost());
   }
 
-  globalThis.runJob = (job) => {
+  globalThis.runJob = (text) => {
+    const job = JSON.parse(text);
     const held = {};
     let context;
     try {

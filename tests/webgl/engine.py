@@ -5,8 +5,9 @@ formats of one channel have no last axis.  Row 0 of a texture is uploaded first:
 `flip_y`.  Row 0 of what comes back is the top.  Matrices are as in NumPy, `matrix @ column`.
 """
 
+import json
 from base64 import b64decode, b64encode
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -15,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tests.webgl.browser import opened
+from tests.webgl.browser import Call, opened
 
 CANVAS = "canvas"
 
@@ -195,7 +196,7 @@ class Engine:
     """An open page of one implementation, ready to run jobs."""
 
     name: str
-    call: Callable[[str, Any], Any]
+    call: Call
 
     def run(self, job: Job) -> dict[str, NDArray[Any]]:
         """Return what targets hold after the last pass: (height, width, 4), uint8 or float32, row 0 = top.
@@ -205,7 +206,7 @@ class Engine:
         WebGLError
             If a shader does not compile or link, a uniform or attribute is missing, or GL reports an error.
         """
-        answer = self.call("job => runJob(job)", job.as_json())
+        answer = self.call("runJob", json.dumps(job.as_json()))
         if "error" in answer:
             raise WebGLError(f"{self.name}: {answer['error']}")
         return {name: _pixels(job.target_of(name), text) for name, text in answer["pixels"].items()}
@@ -215,7 +216,7 @@ class Engine:
 def engine(name: str) -> Iterator[Engine]:
     """Keep an engine of the implementation of that name, see `tests.webgl.browser.opened`."""
     with opened(name) as call:
-        call(Path(__file__).with_name("engine.js").read_text(encoding="utf-8"), None)
+        call("text => (0, eval)(text)", Path(__file__).with_name("engine.js").read_text(encoding="utf-8"))
         yield Engine(name, call)
 
 
@@ -223,13 +224,13 @@ def _base64(values: ArrayLike, dtype: str) -> str:
     return b64encode(np.ascontiguousarray(values, dtype=dtype).tobytes()).decode("ascii")
 
 
-def _uniform(value: Uniform) -> str | list[float]:
+def _uniform(value: Uniform) -> str | dict[str, str]:
     if isinstance(value, str):
         return value
     array = np.asarray(value)
-    # WebGL takes matrices column by column.
+    # WebGL takes matrices column by column; JSON has no NaN.
     columns = array.T if array.ndim == 2 and array.shape[0] == array.shape[1] else array
-    return np.ravel(columns).tolist()
+    return {"numbers": _base64(columns, "<f8")}
 
 
 def _pixels(target: Target, text: str) -> NDArray[Any]:
