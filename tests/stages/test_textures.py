@@ -101,12 +101,12 @@ def test_a_nearest_fetch_is_the_texel_in_which_the_point_lies(shape, wrap):
 
 def test_nearest_coordinates_are_cut_to_their_bits():
     texels = np.arange(3.0).reshape(1, 3, 1)
-    just = np.array([1 / 3 + 1e-9, 1 / 3 + 2.0**-16])
+    just = np.array([1 / 3 + 1e-9, 1 / 3 + 2.0**-16, 2 / 3 + 1e-9])  # 2^16 2/3 is 43690.67
     sharp, cut = (
         fetch(Texture(texels, "nearest", nearest_bits=bits), (just, just), Workspace())[0].tolist()
         for bits in (None, 16)
     )
-    assert (sharp, cut) == ([1, 1], [0, 1])
+    assert (sharp, cut) == ([1, 1, 2], [0, 1, 1])
 
 
 @pytest.mark.parametrize("shape", SHAPES)
