@@ -1,7 +1,7 @@
 """Stage: the fragments that a GPU makes of triangles, with its snapped vertices and its clipping.
 
 V vertices, T triangles, P pieces (what clipping leaves of triangles), N corners of the largest piece,
-S spans (one piece in one row), F fragments (one triangle at one pixel centre), K varyings.
+E edges, S spans (one piece in one row), F fragments (one triangle at one pixel centre), K varyings.
 
 Window positions are in pixels with y upwards, as GL has them: the lower left corner of the image is (0, 0).
 A GPU rounds them to a grid of 2^-b pixel (b = 4 in SwiftShader, 8 in Mesa and in most hardware) and decides
@@ -23,7 +23,7 @@ from numpy.typing import DTypeLike
 
 from volref.arrays import Booleans, Floats, Indices, Integers, Numbers
 
-# How far GPUs let triangles reach beyond the viewport before they cut them, as a multiple of its size.
+# How far triangles may reach before they are cut, in half viewports from its centre: software GPUs cut there.
 GUARD_BAND = 1.0
 
 
@@ -53,6 +53,19 @@ class _Spans(NamedTuple):
     row: Integers
     column: Integers
     length: Integers
+
+
+class _Edges(NamedTuple):
+    """Edges that cross rows: piece, 1 if on its right, first row, number of rows, ends by rising y; (E,)."""
+
+    piece: Integers
+    right: Integers
+    first: Integers
+    rows: Integers
+    lower_x: Numbers
+    lower_y: Numbers
+    upper_x: Numbers
+    upper_y: Numbers
 
 
 def rasterize(
@@ -103,10 +116,14 @@ def rasterize(
     return _expanded(spans, _planes(screen, anchor, attributes), triangle, front, (width, height), dtype)
 
 
-def depth_test(fragments: Fragments, pixels: int, clear: float = 1.0) -> Indices:
+def depth_test(
+    fragments: Fragments, pixels: int, clear: float = 1.0, *, depth_bits: int | None = 32
+) -> Indices:
     """Return the fragment that a depth test LESS leaves at each pixel that has one, in the order of pixels.
 
     Fragments are drawn in their order: of equal depths the first stays, and none at or beyond `clear`.
+    Depths are compared as the buffer holds them: in float32 (32 bits), as whole steps (16 or 24 bits), or as
+    they were computed (None).
 
     Examples
     --------
@@ -116,12 +133,20 @@ def depth_test(fragments: Fragments, pixels: int, clear: float = 1.0) -> Indices
     >>> depth_test(fragments, 6).tolist()
     [2, 0]
     """
-    depth = np.full(pixels, clear, dtype=fragments.window_z.dtype)
-    np.minimum.at(depth, fragments.pixel, fragments.window_z)
-    nearest = fragments.window_z == depth[fragments.pixel]
-    alive = np.flatnonzero(nearest & (fragments.window_z < clear))
+    depth, empty = (_stored(np.asarray(value), depth_bits) for value in (fragments.window_z, clear))
+    nearest = np.full(pixels, empty)
+    np.minimum.at(nearest, fragments.pixel, depth)
+    alive = np.flatnonzero((depth == nearest[fragments.pixel]) & (depth < empty))
     _, first = np.unique(fragments.pixel[alive], return_index=True)
     return alive[first]
+
+
+def _stored(depth: Floats, bits: int | None) -> Numbers:
+    if bits is None:
+        return depth
+    if bits == 32:
+        return depth.astype(np.float32)
+    return np.asarray(np.rint(np.clip(depth, 0, 1) * (2.0**bits - 1)))
 
 
 def _clipped(corners: Numbers, near: float, band: float) -> _Pieces:
@@ -230,46 +255,44 @@ def _first_center(place: Numbers, bits: int | None) -> Integers:
 
 
 def _spans(
-    x: Numbers, y: Numbers, count: Integers, front: Booleans, width: int, height: int, bits: int | None
+    x: Numbers, y: Numbers, sides: Integers, front: Booleans, width: int, height: int, bits: int | None
 ) -> _Spans:
-    """Return the runs of pixels of convex polygons (P, N), those of a piece from the top of the image down.
-
-    Every edge crosses some rows; counter-clockwise, those that run downwards bound the polygon on the left.
-    """
+    """Return the runs of pixels of convex polygons (P, N), those of a piece from the top down."""
     row = np.clip(_first_center(y, bits), 0, height)
-    present = np.arange(x.shape[1]) < count[:, None]
-    lowest = np.where(present, row, height).min(axis=1, initial=height)
-    rows = np.where(present, row, 0).max(axis=1, initial=0) - lowest
-    offset = np.cumsum(rows) - rows
-    left = np.zeros(int(rows.sum()), dtype=np.int64)
-    right = np.zeros_like(left)
-    next_row = _ahead(row, count)
-    piece, corner = np.nonzero(present & (row != next_row))
-    down = next_row[piece, corner] < row[piece, corner]
-    ends = [
-        (x[piece, corner], y[piece, corner]),
-        (_ahead(x, count)[piece, corner], _ahead(y, count)[piece, corner]),
-    ]
-    (lower_x, upper_x), (lower_y, upper_y) = (
-        (np.where(down, b, a), np.where(down, a, b)) for a, b in zip(*ends, strict=True)
-    )
-    first = np.minimum(row, next_row)[piece, corner]
-    crossed = np.maximum(row, next_row)[piece, corner] - first
-    edge, step = _counted(crossed)
-    at_row = first[edge] + step
-    crossing = _crossings(lower_x, lower_y, upper_x, upper_y, edge, at_row, bits)
-    crossing = np.clip(crossing, 0, width)
-    slot = offset[piece[edge]] + at_row - lowest[piece[edge]]
-    on_left = (down == front[piece])[edge]
-    left[slot[on_left]] = crossing[on_left]
-    right[slot[~on_left]] = crossing[~on_left]
-    owner, step = _counted(rows)
-    # From the top down.
-    backwards = offset[owner] + rows[owner] - 1 - step
-    left, right = left[backwards], right[backwards]
+    present = np.arange(x.shape[1]) < sides[:, None]
+    highest = np.where(present, row, 0).max(axis=1, initial=0)
+    rows = highest - np.where(present, row, height).min(axis=1, initial=height)
+    piece, from_top = _counted(rows)
+    # Row r of a piece is at top[piece] - r.
+    top = np.cumsum(rows) - rows + highest - 1
+    bounds = np.zeros((2, len(piece)), dtype=np.int64)
+    edges = _edges(x, y, row, sides, present, front)
+    edge, step = _counted(edges.rows)
+    at_row = edges.first[edge] + step
+    crossing = np.clip(_crossings(edges, edge, at_row, bits), 0, width)
+    bounds[edges.right[edge], top[edges.piece[edge]] - at_row] = crossing
+    left, right = bounds
     full = np.flatnonzero(right > left)
-    span_row = lowest[owner] + rows[owner] - 1 - step
-    return _Spans(owner[full], span_row[full], left[full], (right - left)[full])
+    piece = piece[full]
+    return _Spans(piece, highest[piece] - 1 - from_top[full], left[full], (right - left)[full])
+
+
+def _edges(
+    x: Numbers, y: Numbers, row: Integers, sides: Integers, present: Booleans, front: Booleans
+) -> _Edges:
+    """Return the edges of polygons that cross rows; counter-clockwise, the upward ones bound on the right."""
+    next_row = _ahead(row, sides)
+    which = np.nonzero(present & (row != next_row))
+    start, end = row[which], next_row[which]
+    up = end > start
+    ends = [(x[which], _ahead(x, sides)[which]), (y[which], _ahead(y, sides)[which])]
+    (lower_x, lower_y), (upper_x, upper_y) = (
+        [np.where(up == first, a, b) for a, b in ends] for first in (True, False)
+    )
+    right = (up == front[which[0]]).astype(np.int64)
+    return _Edges(
+        which[0], right, np.minimum(start, end), np.abs(end - start), lower_x, lower_y, upper_x, upper_y
+    )
 
 
 def _counted(lengths: Integers) -> tuple[Integers, Integers]:
@@ -278,25 +301,17 @@ def _counted(lengths: Integers) -> tuple[Integers, Integers]:
     return run, np.arange(len(run)) - (np.cumsum(lengths) - lengths)[run]
 
 
-def _crossings(
-    lower_x: Numbers,
-    lower_y: Numbers,
-    upper_x: Numbers,
-    upper_y: Numbers,
-    edge: Integers,
-    row: Integers,
-    bits: int | None,
-) -> Integers:
+def _crossings(edges: _Edges, which: Integers, row: Integers, bits: int | None) -> Integers:
     """Return the first pixel whose centre is at or to the right of where edges cross rows."""
-    dx, dy = upper_x - lower_x, upper_y - lower_y
+    x, y = edges.lower_x, edges.lower_y
+    dx, dy = edges.upper_x - x, edges.upper_y - y
     if bits is None:
-        slope = dx / dy
-        return _first_center(lower_x[edge] + (row + 0.5 - lower_y[edge]) * slope[edge], bits)
+        return _first_center(x[which] + (row + 0.5 - y[which]) * (dx / dy)[which], bits)
     half = 2 ** (bits - 1)
     # ceil((x - half) / 2^bits) of x = lower_x + (y - lower_y) dx / dy at y = row 2^bits + half.
-    offset = (lower_x - half) * dy + (half - lower_y) * dx
+    offset = (x - half) * dy + (half - y) * dx
     divisor = dy << bits
-    return np.asarray(-((-offset[edge] - (dx << bits)[edge] * row) // divisor[edge]))
+    return np.asarray(-((-offset[which] - (dx << bits)[which] * row) // divisor[which]))
 
 
 def _homogeneous(position: Numbers, width: int, height: int, bits: int | None) -> Floats:
