@@ -40,6 +40,10 @@ class Device(Switches):
         int | None,
         Whole("bits to which a linear filter of 8-bit textures rounds (None: all)", low=1, high=24),
     ] = None
+    nearest_bits: Annotated[
+        int | None,
+        Whole("fraction bits of a nearest fetch's place in 8-bit textures (None: all)", low=1, high=24),
+    ] = None
     subpixel_bits: Annotated[
         int | None, Whole("fraction bits of a vertex's window position (None: all)", low=1, high=16)
     ] = None
@@ -100,7 +104,7 @@ PRESETS: dict[str, Device] = {
     for device in (
         Device(),
         Device("exact", control="float64"),
-        Device("swiftshader", subpixel_bits=4, nan_stored="one"),
+        Device("swiftshader", nearest_bits=16, subpixel_bits=4, nan_stored="one"),
         Device(
             "llvmpipe",
             weight_bits=8,

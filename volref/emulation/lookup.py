@@ -55,7 +55,7 @@ def look_up(textures: Textures, position: Floats, work: Workspace) -> Found:
     if order == "per-slice":
         return _per_slice(textures, pair, work)
     if order == "pre" or textures.volume.texels.shape[-1] > 1:
-        one = fetch(textures.volume, (pair.u1, pair.v1), work).copy()
+        one = fetch(textures.volume, (pair.u1, pair.v1), work)
         two = fetch(textures.volume, (pair.u2, pair.v2), work)
         if order == "pre":
             color = _between(textures, one, two, pair)
@@ -67,7 +67,7 @@ def look_up(textures: Textures, position: Floats, work: Workspace) -> Found:
 
 
 def classified(textures: Textures, value: Floats, work: Workspace) -> Floats:
-    """Return the table's colour (4, n) of values (n,); the result lies in `work` until the next fetch."""
+    """Return the table's colour (4, n) of values (n,)."""
     place = table_place(textures.pipeline.table, value)
     half = work.get("half", len(place), place.dtype)
     half.fill(0.5)
@@ -84,8 +84,8 @@ def _value_of(textures: Textures, channels: Floats) -> Floats:
 
 
 def _per_slice(textures: Textures, pair: SlicePair, work: Workspace) -> Found:
-    values = [value.copy() for value in fetch_slices(textures.volume, *pair[3:], work)]
-    one = classified(textures, values[0], work).copy()
+    values = fetch_slices(textures.volume, *pair[3:], work)
+    one = classified(textures, values[0], work)
     two = classified(textures, values[1], work)
     return Found(_between(textures, values[0], values[1], pair), _between(textures, one, two, pair))
 

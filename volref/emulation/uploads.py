@@ -157,8 +157,15 @@ def table_texture(uploads: Uploads, pipeline: Pipeline, device: Device) -> Textu
 
 
 def _texture(texels: Floats, kind: str, device: Device, *, narrow: bool) -> Texture:
-    weight_bits, result_bits = (device.weight_bits, device.result_bits) if narrow else (None, None)
-    return Texture(texels, kind, weight_bits=weight_bits, result_bits=result_bits)
+    if not narrow:
+        return Texture(texels, kind)
+    return Texture(
+        texels,
+        kind,
+        weight_bits=device.weight_bits,
+        result_bits=device.result_bits,
+        nearest_bits=device.nearest_bits,
+    )
 
 
 def table_place(table: TableTexture, values: Floats) -> Floats:

@@ -1,0 +1,78 @@
+"""Pixels that hang on a comparison: where a nudge as small as float32's own error changes the image.
+
+A GPU program is full of them: is the ray at its end, is alpha at its threshold, is the surface met, does the
+pixel centre lie inside an edge, which byte is nearest.  Two correct machines may answer differently where the
+two sides are all but equal, and the pixel then differs by a whole sample.  They are found by drawing the scene
+again with the eye moved by a few millionths of the box and the threshold of alpha by as much: what stays the
+same within half an 8-bit step does not hang on a comparison.
+"""
+
+import dataclasses
+from collections.abc import Iterator
+from itertools import product
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from volref.arrays import Booleans, Floats
+from volref.emulation.box import box_of
+from volref.emulation.device import Device
+from volref.emulation.passes import emulate
+from volref.emulation.pipeline import Pipeline
+from volref.scene.camera import Camera
+from volref.scene.scene import Scene
+from volref.scene.transform import affine
+
+# 32 units in the last place of float32 at 1: positions in the box are off by a few after some hundred additions.
+NUDGE = 2.0**-19
+
+# A pixel that changes by more than this hangs on a comparison; one that does not, changes by about NUDGE.
+VISIBLE = 0.5 / 255
+
+
+def ambiguous(
+    scene: Scene,
+    pipeline: Pipeline,
+    device: Device | None = None,
+    jitter: ArrayLike | None = None,
+    frames: int = 1,
+) -> Booleans:
+    """Return which pixels (H, W) of an emulation hang on a comparison; arguments as for `emulate`.
+
+    A coordinate that is stored in 8 bits counts: where it is near the middle between two bytes, the ray is
+    another one.
+    """
+    base = _floating(pipeline)
+    plain = emulate(scene, base, device, jitter, frames).rgba
+    found = np.zeros((scene.height, scene.width), np.bool_)
+    for moved, changed in _nudged(scene, base):
+        found |= _differ(plain, emulate(moved, changed, device, jitter, frames).rgba)
+    return found
+
+
+def _floating(pipeline: Pipeline) -> Pipeline:
+    """Return the program with a canvas of floats, whose changes are not rounded away."""
+    changes = {"format": "float"} | ({"mean_format": "float"} if pipeline.output.mean_format else {})
+    return pipeline.with_switches(output=changes)
+
+
+def _nudged(scene: Scene, pipeline: Pipeline) -> Iterator[tuple[Scene, Pipeline]]:
+    """Yield the scene from the eight corners of a small cube around the eye, and thresholds on both sides."""
+    size = NUDGE * float(box_of(scene).sides.min())
+    for corner in product((-1.0, 1.0), repeat=3):
+        threshold = pipeline.stepping.opaque_at
+        changed = pipeline
+        if threshold is not None:
+            changed = pipeline.with_switches(stepping={"opaque_at": threshold + corner[0] * NUDGE})
+        camera = _moved(scene.camera, size * np.array(corner))
+        yield dataclasses.replace(scene, camera=camera), changed
+
+
+def _moved(camera: Camera, by: Floats) -> Camera:
+    """Return a camera moved by a vector of view space."""
+    return dataclasses.replace(camera, view_from_world=affine(np.eye(3), -by) @ camera.view_from_world)
+
+
+def _differ(one: Floats, other: Floats) -> Booleans:
+    apart = np.abs(one - other) > VISIBLE
+    return np.asarray((apart | (np.isnan(one) != np.isnan(other))).any(axis=-1))
