@@ -23,7 +23,7 @@ from volref.scene.camera import Camera
 from volref.scene.scene import Scene
 from volref.scene.transform import affine
 
-# 32 units in the last place of float32 at 1: positions in the box are off by a few after some hundred additions.
+# 32 units in the last place of float32 at 1; positions are off by a few after some hundred additions.
 NUDGE = 2.0**-19
 
 # A pixel that changes by more than this hangs on a comparison; one that does not, changes by about NUDGE.
