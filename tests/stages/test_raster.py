@@ -184,6 +184,27 @@ def test_a_guard_band_keeps_the_edges_of_what_it_does_not_cut():
     assert abs(len(kept.pixel) - len(exact.pixel)) < abs(len(cut.pixel) - len(exact.pixel))
 
 
+def test_a_triangle_seen_edge_on_has_no_nan_where_snapping_gave_it_pixels():
+    # Corners on the line y = x / 4, all numbers dyadic: exactly flat, but not on a grid of half pixels.
+    x = np.array([-115.0, 10.0, 119.0]) / 128
+    w = np.array([1.0, 2.0, 4.0])
+    corners = np.stack([x * w, x / 4 * w, 0 * w, w], axis=1)
+    fragments = rasterize(corners, ONE, np.eye(3), 64, 64, subpixel_bits=1, planes="unsnapped")
+    assert len(fragments.pixel) > 0
+    np.testing.assert_array_equal(fragments.inverse_w, 3 / 7)
+    np.testing.assert_allclose(fragments.varyings, 1 / 3, rtol=1e-15)
+
+
+def test_corners_in_the_plane_of_the_eye_do_no_harm():
+    corners = np.array([[0.0, 0.0, 0.0, 1.0], [1.0, 0.0, 0.5, 0.0], [0.0, 1.0, 0.5, 0.0]])
+    for bits in (4, None):
+        fragments = rasterize(corners, ONE, corners, 8, 8, subpixel_bits=bits, planes="unsnapped")
+        # On the screen x = u / (1 - u - v): the whole upper right quarter as far as the far plane.
+        assert set(fragments.pixel % 8) == set(range(4, 8))
+        place = (fragments.pixel % 8 + 0.5) / 4 - 1
+        np.testing.assert_allclose(fragments.varyings[0] * fragments.inverse_w, place, rtol=0, atol=1e-12)
+
+
 def test_float32_is_float64_rounded_to_a_few_ulp():
     vertices, triangles = jittered_mesh(1, 1.3)
     fine, coarse = (

@@ -25,6 +25,7 @@ from volref.arrays import Booleans, Floats, Indices, Integers, Numbers
 
 # How far triangles may reach before they are cut, in half viewports from its centre: software GPUs cut there.
 GUARD_BAND = 1.0
+LEAST_W = 1e-30
 
 
 class Fragments(NamedTuple):
@@ -106,14 +107,17 @@ def rasterize(
     x, y = _window(pieces.position, width, height, subpixel_bits)
     area = _doubled_area(x, y, pieces.sides)
     wanted = np.flatnonzero(((area > 0) & (cull != "front")) | ((area < 0) & (cull != "back")))
-    front, triangle = area[wanted] > 0, pieces.triangle[wanted]
-    spans = _spans(x[wanted], y[wanted], pieces.sides[wanted], front, width, height, subpixel_bits)
-    bits = subpixel_bits if planes == "snapped" else None
-    attributes = _attributes(corners[triangle].astype(np.float64), varyings[triangles[triangle]], clip_z)
-    screen = _homogeneous(corners[triangle], width, height, bits)
+    x, y, front = x[wanted], y[wanted], area[wanted] > 0
+    spans = _spans(x, y, pieces.sides[wanted], front, width, height, subpixel_bits)
+    # Most triangles of a fine mesh lie between pixel centres: attributes are for the others.
+    drawn = np.unique(spans.piece)
+    spans = spans._replace(piece=np.searchsorted(drawn, spans.piece))
+    triangle = pieces.triangle[wanted][drawn]
     scale = 1.0 if subpixel_bits is None else 2.0**-subpixel_bits
-    anchor = x[wanted, 0] * scale, y[wanted, 0] * scale
-    return _expanded(spans, _planes(screen, anchor, attributes), triangle, front, (width, height), dtype)
+    anchor = x[drawn, 0] * scale, y[drawn, 0] * scale
+    screen = _homogeneous(corners[triangle], width, height, subpixel_bits if planes == "snapped" else None)
+    attributes = _attributes(corners[triangle].astype(np.float64), varyings[triangles[triangle]], clip_z)
+    return _expanded(spans, _planes(screen, anchor, attributes), triangle, front[drawn], width, height, dtype)
 
 
 def depth_test(
@@ -222,7 +226,8 @@ def _window(position: Floats, width: int, height: int, bits: int | None) -> tupl
     it shifts the origin before it rounds.
     """
     x, y, _, w = np.moveaxis(position, -1, 0)
-    inverse = 1 / np.where(w == 0, w.dtype.type(1), w)
+    # Corners in the plane of the eye have no place; 1 / w of any number stands for one and does not overflow.
+    inverse = 1 / np.where(np.abs(w) < LEAST_W, w.dtype.type(1), w)
     if bits is None:
         return (x * inverse + 1) * (width / 2), (y * inverse + 1) * (height / 2)
     grid = []
@@ -354,8 +359,13 @@ def _planes(screen: Floats, anchor: tuple[Floats, Floats], attributes: Floats) -
     x_k, y_k, w_k = (np.roll(part, -2, axis=1) for part in (x_w, y_w, w))
     weights = np.stack([x_j * y_k - x_k * y_j, y_j * w_k - y_k * w_j, x_k * w_j - x_j * w_k])
     determinant = np.sum(weights[0] * w, axis=1)
-    # A triangle that the grid made flat has no plane, though a piece of it may have pixels.
-    weights = weights / np.where(determinant == 0, np.inf, determinant)[:, None]
+    # Flat on the screen, a triangle has no plane, though a snapped piece of it may have pixels: they get the
+    # mean of its corners.
+    flat = np.flatnonzero(determinant == 0)
+    determinant[flat] = 1
+    weights /= determinant[:, None]
+    weights[:, flat] = 0
+    weights[0, flat] = 1 / np.abs(w[flat]).sum(axis=1, keepdims=True)
     value, step_x, step_y = np.einsum("spc,pck->spk", weights, attributes)
     return _Planes(value, step_x, step_y, *anchor)
 
@@ -365,11 +375,11 @@ def _expanded(
     planes: _Planes,
     triangle: Integers,
     front: Booleans,
-    place: tuple[int, int],
+    width: int,
+    height: int,
     dtype: DTypeLike,
 ) -> Fragments:
     """Return the fragments of spans with their attributes, which are computed in `dtype`."""
-    width, height = place
     value, step_x, step_y, x, y = (field.astype(dtype) for field in planes)
     piece = spans.piece
     up = (spans.row + 0.5).astype(dtype) - y[piece]
