@@ -1,6 +1,6 @@
-// The part of the engine that runs in the page: `runJob` takes a job as `engine.py` writes it, JSON, and returns
-// {pixels: {target: base64, rows from the bottom}} or {error: one text}.  Everything a pass depends on is set
-// by the pass, so no job sees what another one left behind.
+// The part of the engine in the page: `runJob` takes a job as `engine.py` writes it, JSON, and returns
+// {pixels: {target: {width, height, kind, data}}}, base64 with rows from the bottom, or {error: one text}.
+// Everything a pass depends on is set by the pass, so no job sees what another one left behind.
 "use strict";
 
 (() => {
@@ -56,8 +56,7 @@
     const kept = contexts[version];
     if (kept && !kept.gl.isContextLost()) return kept;
     const gl = document.createElement("canvas").getContext(version === 2 ? "webgl2" : "webgl", {
-      alpha: true, depth: true, stencil: false, antialias: false, premultipliedAlpha: true,
-      preserveDrawingBuffer: true,
+      alpha: true, depth: true, stencil: false, antialias: false, premultipliedAlpha: true, preserveDrawingBuffer: true,
     });
     if (!gl) throw new Error(`no context of WebGL ${version}`);
     for (const name of EXTENSIONS[version]) {
@@ -194,10 +193,8 @@
   }
 
   function setterOf(gl, type) {
-    const vectors = { FLOAT: "f", INT: "i", BOOL: "i", UNSIGNED_INT: "ui" };
-    for (const [name, letter] of Object.entries(vectors)) {
-      const sizes = [gl[name], ...[2, 3, 4].map((n) => gl[`${name}_VEC${n}`])];
-      const at = sizes.indexOf(type);
+    for (const [name, letter] of [["FLOAT", "f"], ["INT", "i"], ["BOOL", "i"], ["UNSIGNED_INT", "ui"]]) {
+      const at = [gl[name], ...[2, 3, 4].map((n) => gl[`${name}_VEC${n}`])].indexOf(type);
       if (at >= 0) return `uniform${at + 1}${letter}v`;
     }
     throw new Error(`a uniform of type 0x${type.toString(16)} is not known here`);
@@ -246,7 +243,7 @@
     gl.pixelStorei(gl.PACK_ALIGNMENT, 1);
     const pixels = new ARRAYS[read](width * height * 4);
     gl.readPixels(0, 0, width, height, gl.RGBA, gl[read], pixels);
-    return encoded(pixels);
+    return { width, height, kind: read, data: encoded(pixels) };
   }
 
   function run(job, context, held) {

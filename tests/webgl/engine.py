@@ -183,9 +183,6 @@ class Job:
         on_canvas = any(one.target == CANVAS for one in self.passes)
         return (*self.targets, *((CANVAS,) if on_canvas else ()))
 
-    def target_of(self, name: str) -> Target:
-        return self._sized(Target() if name == CANVAS else self.targets[name])
-
     def _sized(self, target: Target) -> Target:
         width, height = target.width or self.width, target.height or self.height
         return Target(target.format, target.depth, target.filter, width, height)
@@ -209,7 +206,7 @@ class Engine:
         answer = self.call("runJob", json.dumps(job.as_json()))
         if "error" in answer:
             raise WebGLError(f"{self.name}: {answer['error']}")
-        return {name: _pixels(job.target_of(name), text) for name, text in answer["pixels"].items()}
+        return {name: _pixels(**read) for name, read in answer["pixels"].items()}
 
 
 @contextmanager
@@ -233,7 +230,6 @@ def _uniform(value: Uniform) -> str | dict[str, str]:
     return {"numbers": _base64(columns, "<f8")}
 
 
-def _pixels(target: Target, text: str) -> NDArray[Any]:
-    dtype = "u1" if target.format.endswith("8") else "<f4"
-    rows = np.frombuffer(b64decode(text), dtype).reshape(target.height, target.width, 4)
-    return rows[::-1].copy()
+def _pixels(width: int, height: int, kind: str, data: str) -> NDArray[Any]:
+    dtype = "u1" if kind == "UNSIGNED_BYTE" else "<f4"
+    return np.frombuffer(b64decode(data), dtype).reshape(height, width, 4)[::-1].copy()
