@@ -1,0 +1,5 @@
+"""The systems of the catalogue in GLSL, written from their papers: a second implementation of each."""
+
+from tests.webgl.systems import congote
+
+SYSTEMS = (congote.SYSTEM,)

@@ -1,0 +1,80 @@
+"""What is compared: systems, their pipelines with a canvas of bytes and one of floats, and the scenes they draw."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tests.webgl.engine import Engine
+from tests.webgl.figures import Figures, figures
+from tests.webgl.scenes import EXAMPLES
+from tests.webgl.systems import SYSTEMS
+from tests.webgl.systems.common import System
+from volref import Scene
+from volref.emulation.ambiguity import ambiguous
+from volref.emulation.catalogue import named
+from volref.emulation.device import Device
+from volref.emulation.passes import emulate
+from volref.emulation.pipeline import Pipeline
+
+
+@dataclass(frozen=True)
+class Case:
+    """A pipeline of a system on a scene, with a canvas (and a mean of frames) in "unorm8" or "float"."""
+
+    system: System
+    pipeline: str
+    format: str
+    scene: str
+
+    def __str__(self) -> str:
+        return f"{self.pipeline}, {self.format}, {self.scene}"
+
+    def described(self) -> Pipeline:
+        """The pipeline with its last targets in this format."""
+        pipeline = named(self.pipeline)
+        changes = {"format": self.format}
+        if pipeline.output.mean_format is not None:
+            changes["mean_format"] = self.format
+        return pipeline.with_switches(output=changes)
+
+
+def suits(system: System, scene: str) -> bool:
+    return EXAMPLES[scene].needs <= system.suits
+
+
+def cases() -> list[Case]:
+    """All there are."""
+    return [
+        Case(system, pipeline, kind, scene)
+        for system in SYSTEMS
+        for pipeline in system.pipelines
+        for kind in ("unorm8", "float")
+        for scene in EXAMPLES
+        if suits(system, scene)
+    ]
+
+
+def jitter_of(system: System, scene: Scene) -> np.ndarray | None:
+    """Start offsets (frames, H, W) as a texture of floats holds them."""
+    if not system.jitter:
+        return None
+    size = system.frames, scene.height, scene.width
+    return np.random.default_rng(5).random(size, np.float32)
+
+
+def compared(engine: Engine, case: Case) -> dict[str, Figures]:
+    """Figures of every target."""
+    scene, pipeline, device = EXAMPLES[case.scene].make(), case.described(), Device.named(engine.name)
+    jitter, frames = jitter_of(case.system, scene), case.system.frames
+    ours = emulate(scene, pipeline, device, jitter, frames).passes
+    theirs = case.system.draw(engine, scene, pipeline, jitter=jitter, frames=frames)
+    assert set(theirs) == set(ours), f"emulated {sorted(ours)}, drawn {sorted(theirs)}"
+
+    def predicted() -> np.ndarray:
+        return ambiguous(scene, pipeline, device, jitter, frames)
+
+    on_canvas = {"canvas", "frame", "running_mean"}
+    cleared = {
+        name: scene.background if name in on_canvas else np.zeros(ours[name].shape[-1]) for name in ours
+    }
+    return {name: figures(ours[name], theirs[name], predicted, cleared[name]) for name in ours}

@@ -1,0 +1,7 @@
+// Texture coordinates as colours.
+precision highp float;
+varying highp vec3 place;
+
+void main() {
+  gl_FragColor = vec4(place, 1.0);
+}

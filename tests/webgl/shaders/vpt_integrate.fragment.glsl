@@ -1,0 +1,13 @@
+#version 300 es
+// VPT, the mean of the frames up to this one; share is 1 / n for frame n.
+precision highp float;
+precision highp sampler2D;
+uniform sampler2D mean;
+uniform sampler2D frame;
+uniform float share;
+in vec2 place;
+out vec4 color;
+
+void main() {
+    color = mix(texture(mean, place), texture(frame, place), share);
+}

@@ -1,0 +1,65 @@
+"""VPT's emission-absorption renderer in real WebGL 2: frame, running mean and tone map, frame by frame."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from tests.webgl.engine import Engine, Job, Pass, Target
+from tests.webgl.systems.common import TARGETS, drawn, float32, program, table_upload, volume_upload
+from volref import Scene
+from volref.emulation.box import box_of
+from volref.emulation.opacity import factor_of
+from volref.emulation.pipeline import Pipeline
+from volref.emulation.uploads import uploads_of
+
+ALPHA = {"one": "1.0", "accumulated": "sum.a"}
+
+
+def draw(
+    browser: Engine, scene: Scene, pipeline: Pipeline, *, jitter: np.ndarray | None = None, frames: int = 1
+) -> dict[str, np.ndarray]:
+    """Every target by name; jitter is (frames, H, W), and the same all over each frame."""
+    uploads = uploads_of(scene, pipeline)
+    output, plain = pipeline.output, {"read": ("frame", "mean", "final")}
+    targets = {"frame": Target(TARGETS[output.format]), "final": Target(TARGETS[output.format])}
+    targets |= dict.fromkeys(("mean", "other"), Target(TARGETS[output.mean_format]))
+    textures = {
+        "volume": volume_upload(uploads, pipeline, version=2),
+        "colors": table_upload(uploads, pipeline, version=2),
+    }
+    offsets = offsets_of(jitter, frames)
+    passes = tuple(_passes(scene, pipeline, offsets))
+    job = Job(scene.width, scene.height, passes, textures, targets, version=2, **plain)
+    images = drawn(browser, job)
+    return {"frame": images["frame"], "running_mean": images["mean"], "canvas": images["final"]}
+
+
+def offsets_of(jitter: np.ndarray | None, frames: int) -> list[float]:
+    """Offset of each frame."""
+    if jitter is None:
+        return [0.0] * frames
+    assert all(np.ptp(frame) == 0 for frame in jitter)
+    return [float(frame[0, 0]) for frame in jitter]
+
+
+def _passes(scene: Scene, pipeline: Pipeline, offsets: list[float]) -> Iterator[Pass]:
+    screen, output = "vpt_screen.vertex", pipeline.output
+    generate = program("vpt.vertex", "vpt.fragment", {"ALPHA": ALPHA[pipeline.accumulation.alpha]})
+    generated = {
+        "texture_from_clip": float32(np.linalg.inv(box_of(scene).clip_from_texture)),
+        "volume": "volume",
+        "colors": "colors",
+        "step_size": 1 / pipeline.stepping.steps,
+        "extinction": factor_of(scene, pipeline, box_of(scene)),
+    }
+    # The mean of the last frame is to be in "mean": the two targets take turns.
+    turns = ["mean", "other"] if len(offsets) % 2 == 0 else ["other", "mean"]
+    yield Pass(program(screen, "vpt_reset.fragment"), target=turns[0])
+    for number, offset in enumerate(offsets, start=1):
+        before, after = turns[(number - 1) % 2], turns[number % 2]
+        yield Pass(generate, uniforms={**generated, "offset": offset}, target="frame")
+        mixed = {"mean": before, "frame": "frame", "share": 1 / number}
+        yield Pass(program(screen, "vpt_integrate.fragment"), uniforms=mixed, target=after)
+    names = ("low", "mid", "high", "saturation", "gamma")
+    shaped = {"mean": "mean", **{name: getattr(output, name) for name in names}}
+    yield Pass(program(screen, "vpt_artistic.fragment"), uniforms=shaped, target="final")
