@@ -1,4 +1,4 @@
-"""What is compared: systems, their pipelines with a canvas of bytes and one of floats, and the scenes they draw."""
+"""What is compared: the systems' pipelines with a canvas of bytes and with one of floats, on their scenes."""
 
 from dataclasses import dataclass
 

@@ -16,8 +16,8 @@ from volref.formats import codes_of
 class Figures:
     """Figures of one target, or of several taken together.
 
-    error (n,): largest difference of a drawn pixel's channels, in 1/255 for targets of bytes.  unexplained: how
-    many pixels are off by more than 1/255 and were not predicted to hang on a comparison.
+    error (n,): largest difference of a drawn pixel's channels, in 1/255 for targets of bytes.  unexplained:
+    how many pixels are off by more than 1/255 and were not predicted to hang on a comparison.
     """
 
     bytes: bool

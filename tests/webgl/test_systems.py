@@ -1,4 +1,4 @@
-"""Emulations held to real WebGL: every system, as published and as it works, every target, on small scenes."""
+"""Emulations held to real WebGL: every system, as it works and as printed, target by target, small scenes."""
 
 import pytest
 

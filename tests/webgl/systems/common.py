@@ -1,4 +1,4 @@
-"""What the programs of all systems share: uploads, matrices, geometry, targets, and a job's way there and back.
+"""What the programs of all systems share: uploads, matrices, geometry, targets, a job's way there and back.
 
 Arithmetic of the systems is in their GLSL; here is only what a page's JavaScript would do before it draws.
 """
@@ -13,7 +13,7 @@ from tests.webgl.engine import CANVAS, Engine, Geometry, Job, Pass, Program, Tar
 from volref import Mesh, Scene
 from volref.emulation.box import CORNERS, box_of
 from volref.emulation.pipeline import Pipeline
-from volref.emulation.uploads import Uploads, uploads_of
+from volref.emulation.uploads import Uploads
 
 # The last target, in bytes or floats; the real canvas has bytes only.
 IMAGE = "image"
@@ -40,9 +40,9 @@ BLENDS = {
 class System:
     """A system that real WebGL draws.
 
-    draw: (engine, scene, pipeline, *, jitter=None, frames=1) -> every target by the emulation's own pass names,
-    (H, W, channels), row 0 at the top, uint8 or float32.  pipelines: names in the catalogue.  suits: kinds of
-    scenes (see `scenes.py`) that it draws beside plain ones.  p99: what 99 of 100 pixels of a float image are
+    draw: (engine, scene, pipeline, *, jitter=None, frames=1) -> every target by the emulation's own names,
+    (H, W, channels), row 0 at the top, uint8 or float32.  pipelines: names in the catalogue.  suits: kinds
+    of scenes (see `scenes.py`) that it draws beside plain ones.  p99: what 99 of 100 pixels of a float image are
     within.  jitter: whether it is given start offsets.  frames: how many it averages in the tests.
     """
 
