@@ -59,12 +59,25 @@ def faces(scene: Scene, box: Box, device: Device, cull: str) -> Fragments:
 def _two_passes(scene: Scene, pipeline: Pipeline, box: Box, device: Device) -> tuple[Ends, dict[str, Floats]]:
     front = faces(scene, box, device, "back")
     targets = {"back_coordinates": _target(faces(scene, box, device, "front"), scene, pipeline, device)}
-    exits = _read(targets["back_coordinates"], front.pixel, scene, pipeline, device)
+    exits = _read(targets["back_coordinates"], front, pipeline, box, device)
     entries = front.varyings.astype(device.control_type)
     if pipeline.rays.front == "target":
         targets = {"front_coordinates": _target(front, scene, pipeline, device)} | targets
-        entries = _read(targets["front_coordinates"], front.pixel, scene, pipeline, device)
-    return Ends(front.pixel, entries, exits), targets
+        entries = _read(targets["front_coordinates"], front, pipeline, box, device)
+    else:
+        # No target of the program's own: what a frame capture shows when the varying is drawn.
+        shown = pipeline.with_switches(rays={"format": "float"})
+        targets = {"front_coordinates": _target(front, scene, shown, device)} | targets
+    return _walked(Ends(front.pixel, entries, exits), pipeline), targets
+
+
+def _walked(ends: Ends, pipeline: Pipeline) -> Ends:
+    """Return the rays that the shader walks, and which fragments it leaves before that."""
+    if pipeline.rays.no_exit == "walked":
+        return ends
+    none = (ends.exit[0] == 0) & (ends.exit[1] == 0)
+    kept = np.flatnonzero(~none)
+    return Ends(ends.pixel[kept], ends.entry[:, kept], ends.exit[:, kept], ends.pixel[none])
 
 
 def _target(fragments: Fragments, scene: Scene, pipeline: Pipeline, device: Device) -> Floats:
@@ -76,14 +89,17 @@ def _target(fragments: Fragments, scene: Scene, pipeline: Pipeline, device: Devi
     return target.reshape(scene.height, scene.width, 3)
 
 
-def _read(target: Floats, pixel: Indices, scene: Scene, pipeline: Pipeline, device: Device) -> Floats:
-    """Return what a fragment reads of a target at its own place."""
+def _read(target: Floats, fragments: Fragments, pipeline: Pipeline, box: Box, device: Device) -> Floats:
+    """Return what fragments read of a target at their own place, (clip xy / clip w + 1) / 2.
+
+    That place is a varying of the snapped triangle, which the clip positions of its corners are not: it lies
+    up to half a step of the grid beside the pixel's centre, and a linear filter mixes in the neighbours.
+    """
     if pipeline.rays.filter == "nearest":
-        return np.ascontiguousarray(target.reshape(-1, 3)[pixel].T)
-    kind = device.control_type
-    u = (pixel % scene.width + 0.5).astype(kind) / kind(scene.width)
-    v = (pixel // scene.width + 0.5).astype(kind) / kind(scene.height)
-    return fetch(Texture(target), (u, v), Workspace()).copy()
+        return np.ascontiguousarray(target.reshape(-1, 3)[fragments.pixel].T)
+    clip = box.clip_from_texture[:, :3] @ fragments.varyings + box.clip_from_texture[:, 3:]
+    u, v = ((clip[:2] / clip[3] + 1) / 2).astype(device.control_type)
+    return fetch(Texture(target), (u, 1 - v), Workspace())
 
 
 def _from_faces(scene: Scene, box: Box, device: Device) -> Ends:

@@ -51,6 +51,16 @@ class RaySetup(Switches):
             {"target": "a target of its own, as the exit", "varying": "the varying of the faces being drawn"},
         ),
     ] = "target"
+    no_exit: Annotated[
+        str,
+        Word(
+            "what happens where the exit's target has x and y of 0: mostly, where nothing was drawn",
+            {
+                "walked": "the ray is walked as any other",
+                "left": "the fragment is transparent black, seed 002",
+            },
+        ),
+    ] = "walked"
     format: Annotated[str, Word("what a coordinate target holds", STORED)] = "float"
     filter: Annotated[str, Word("how a coordinate target is read", FILTERS)] = "nearest"
 
@@ -256,7 +266,11 @@ class TableTexture(Switches):
         str,
         Word(
             "which value entry k of n stands for",
-            {"centers": "(k + 1/2) / n of the domain", "ends": "k / (n - 1) of the domain"},
+            {
+                "centers": "(k + 1/2) / n of the domain",
+                "ends": "k / (n - 1) of the domain",
+                "canvas": "what the first row of a canvas n by 20 has of a gradient between its corners",
+            },
         ),
     ] = "centers"
     coordinate: Annotated[
@@ -367,7 +381,7 @@ class Accumulation(Switches):
             "the alpha that is written",
             {
                 "accumulated": "A",
-                "weighted": "the sum of the samples' table alpha, weighted as their colour is, seed 002",
+                "weighted": "the sum of the samples' own alpha, weighted as their colour is, seed 002",
                 "one": "1",
             },
         ),

@@ -141,6 +141,8 @@ def drawn(drawing: Drawing, marched: Marched) -> Floats:
     if output.mean_format is None:
         fragments = tone_mapped(fragments, output)
     draw(canvas, drawing.ends.pixel, fragments, output, device)
+    blank = drawing.ends.blank
+    draw(canvas, blank, np.zeros((len(blank), 4), fragments.dtype), output, device)
     return canvas
 
 

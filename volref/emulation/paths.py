@@ -4,7 +4,7 @@ R rays.  Positions and steps are (3, R) in texture space and in the control type
 a shader has them; all else is (R,).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -22,16 +22,14 @@ class Ends:
     """Where rays enter and leave the box.
 
     pixel (R,): flat indices.  entry, exit (3, R): in the control type.  For programs that do not know the
-    exit it lies one unit of texture space behind the entry.
+    exit it lies one unit of texture space behind the entry.  blank: pixels whose fragments are transparent
+    black without a ray.
     """
 
     pixel: Indices
     entry: Floats
     exit: Floats
-
-    def part(self, which: slice) -> "Ends":
-        """Return some of the rays."""
-        return Ends(self.pixel[which], self.entry[:, which], self.exit[:, which])
+    blank: Indices = field(default_factory=lambda: np.zeros(0, np.intp))
 
 
 @dataclass(frozen=True, eq=False)

@@ -30,6 +30,9 @@ from volref.stages.lookup2d import lookup_2d
 from volref.stages.textures import Texture, fetch
 from volref.workspace import Workspace
 
+# Rows of the canvas on which seed 002 draws its table.
+CANVAS_ROWS = 20
+
 
 @dataclass(frozen=True, eq=False)
 class Uploads:
@@ -96,8 +99,7 @@ def baked_table(scene: Scene, table: TableTexture, domain: tuple[float, float]) 
     its own magnitudes.
     """
     n = table.size
-    share = (np.arange(n) + 0.5) / n if table.baked == "centers" else np.arange(n) / (n - 1)
-    values = domain[0] + (domain[1] - domain[0]) * share
+    values = domain[0] + (domain[1] - domain[0]) * baked_at(table)
     transfer = scene.transfer
     if isinstance(transfer, TransferFunction2D):
         low, high = transfer.magnitude_domain
@@ -114,6 +116,26 @@ def baked_table(scene: Scene, table: TableTexture, domain: tuple[float, float]) 
     if table.last_column == "empty":
         entries[:, -1] = 0.0
     return np.ascontiguousarray(entries)
+
+
+def baked_at(table: TableTexture) -> Floats:
+    """Return the shares (n,) of the domain that the entries along the value stand for.
+
+    A canvas's gradient runs from corner (0, 0) to (n - 1, 19); a pixel has the share of its centre's foot on
+    that line.
+
+    Examples
+    --------
+    >>> baked_at(TableTexture(size=4)).tolist(), baked_at(TableTexture(size=3, baked="ends")).tolist()
+    ([0.125, 0.375, 0.625, 0.875], [0.0, 0.5, 1.0])
+    """
+    n = table.size
+    if table.baked == "ends":
+        return np.arange(n) / (n - 1)
+    if table.baked == "canvas":
+        along, down = n - 1, CANVAS_ROWS - 1
+        return ((np.arange(n) + 0.5) * along + 0.5 * down) / (along**2 + down**2)
+    return (np.arange(n) + 0.5) / n
 
 
 def tiles_of(volume: VolumeTexture, slices: int) -> tuple[int, int]:

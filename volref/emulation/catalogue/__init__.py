@@ -2,11 +2,11 @@
 
 from functools import cache
 
-from volref.emulation.catalogue import baseline, congote
+from volref.emulation.catalogue import barbagallo, baseline, congote
 from volref.emulation.pipeline import Pipeline
 from volref.errors import SceneError
 
-MODULES = (baseline, congote)
+MODULES = (baseline, congote, barbagallo)
 
 
 @cache
