@@ -53,6 +53,13 @@ class Device(Switches):
     mix: Annotated[
         str, Word("how mix(x, y, a) is computed", {"difference": "x + (y - x) a", "sum": "x (1 - a) + y a"})
     ] = "difference"
+    constant_divisor: Annotated[
+        str,
+        Word(
+            "what a division by a number that is known when the shader is compiled becomes",
+            {"divided": "a division", "multiplied": "a product with the rounded reciprocal"},
+        ),
+    ] = "divided"
     blend: Annotated[
         str,
         Word(
@@ -104,7 +111,13 @@ PRESETS: dict[str, Device] = {
     for device in (
         Device(),
         Device("exact", control="float64"),
-        Device("swiftshader", nearest_bits=16, subpixel_bits=4, nan_stored="one"),
+        Device(
+            "swiftshader",
+            nearest_bits=16,
+            subpixel_bits=4,
+            nan_stored="one",
+            constant_divisor="multiplied",
+        ),
         Device(
             "llvmpipe",
             weight_bits=8,

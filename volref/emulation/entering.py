@@ -8,29 +8,37 @@ import numpy as np
 from volref.arrays import Floats, Indices
 from volref.emulation.box import CORNERS, Box
 from volref.emulation.device import Device
+from volref.emulation.focal import focal_ends
 from volref.emulation.paths import Ends, vector_length
 from volref.emulation.pipeline import Pipeline
-from volref.errors import SceneError
+from volref.emulation.unprojecting import unprojected_ends
 from volref.formats import stored
 from volref.scene.camera import Camera
 from volref.scene.scene import Scene
 from volref.scene.transform import transform_directions, transform_points
 from volref.stages.raster import Fragments, depth_test, rasterize
-from volref.stages.rays import pixel_ndc, pixel_rays
+from volref.stages.rays import pixel_rays
 from volref.stages.spans import box_spans
 from volref.stages.textures import Texture, fetch
 from volref.workspace import Workspace
 
 
 def ends_of_rays(
-    scene: Scene, pipeline: Pipeline, box: Box, device: Device
+    scene: Scene, pipeline: Pipeline, box: Box, device: Device, surface: Floats | None = None
 ) -> tuple[Ends, dict[str, Floats]]:
-    """Return the ends of the rays of all pixels that the program draws, and its coordinate targets."""
+    """Return the ends of the rays of all pixels that the program draws, and its coordinate targets.
+
+    A slab's ray ends at the latest at the world distance `surface` (H * W, 1).
+    """
     if pipeline.rays.kind == "coordinates":
         return _two_passes(scene, pipeline, box, device)
     if pipeline.rays.kind == "front-face":
         return _from_faces(scene, box, device), {}
-    return _slab(scene, pipeline, box, device), {}
+    if pipeline.rays.direction in ("focal", "focal-square"):
+        return focal_ends(scene, pipeline.rays.direction, box, device, surface), {}
+    if pipeline.rays.direction == "unproject":
+        return unprojected_ends(scene, box, device, surface), {}
+    return _slab(scene, pipeline, box, device, surface), {}
 
 
 def faces(scene: Scene, box: Box, device: Device, cull: str) -> Fragments:
@@ -133,33 +141,33 @@ def _forward(camera: Camera) -> Floats:
     return np.asarray(-camera.world_from_view[:3, 2])
 
 
-def _slab(scene: Scene, pipeline: Pipeline, box: Box, device: Device) -> Ends:
+def _slab(scene: Scene, pipeline: Pipeline, box: Box, device: Device, surface: Floats | None) -> Ends:
     pixels = np.arange(scene.width * scene.height)
     origins, directions = _world_rays(scene, pipeline.rays.direction, pixels)
     starts = transform_points(box.texture_from_world, origins).T
     along = transform_directions(box.texture_from_world, directions).T
     spans = box_spans(starts, along, np.zeros(3), np.ones(3))
-    hit = np.flatnonzero(spans.t_near < spans.t_far)
+    t_near, t_far = spans.t_near, spans.t_far
+    if surface is not None:
+        t_far = np.minimum(t_far, surface[:, 0] - _behind_start(scene.camera, origins))
+    hit = np.flatnonzero(t_near < t_far)
     kind = device.control_type
-    near, far = ((starts[:, hit] + t[hit] * along[:, hit]).astype(kind) for t in (spans.t_near, spans.t_far))
+    near, far = ((starts[:, hit] + t[hit] * along[:, hit]).astype(kind) for t in (t_near, t_far))
     return Ends(hit, near, far)
+
+
+def _behind_start(camera: Camera, origins: Floats) -> Floats:
+    """Return how far (R,) rays that do not start where distances are measured from start behind that."""
+    if camera.is_parallel:
+        return np.zeros(len(origins))
+    return np.asarray(np.linalg.norm(origins - camera.world_from_view[:3, 3], axis=1))
 
 
 def _world_rays(scene: Scene, rule: str, pixels: Indices) -> tuple[Floats, Floats]:
     """Return origins and unit directions (R, 3) in the world; the volume is seen from the origin on."""
     camera = scene.camera
     rays = pixel_rays(camera, scene.width, scene.height, pixels)
-    if rule == "eye" or (rule == "unproject" and camera.is_parallel):
+    if rule == "eye" or camera.is_parallel:
         return rays.origins, rays.directions
-    if rule == "unproject":
-        share = rays.directions @ _forward(camera)
-        return rays.origins + rays.directions * (camera.near / share)[:, None], rays.directions
-    if camera.is_parallel:
-        message = "camera must be a perspective one for pipeline.rays.direction 'focal', got a parallel one; "
-        raise SceneError(message + "use a pipeline with 'eye'")
-    x, y = pixel_ndc(scene.width, scene.height, pixels).T
-    aspect = scene.width / scene.height if rule == "focal" else 1.0
-    focal = camera.clip_from_view(scene.width, scene.height)[1, 1]
-    view = np.stack([x * aspect, y, np.full_like(x, -focal)], axis=1)
-    directions = transform_directions(camera.world_from_view, view)
-    return rays.origins, directions / np.linalg.norm(directions, axis=1, keepdims=True)
+    share = rays.directions @ _forward(camera)
+    return rays.origins + rays.directions * (camera.near / share)[:, None], rays.directions

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from volref.emulation.switches import Flag, Real, Switches, Whole, Word
+from volref.errors import SceneError
 
 STORED = {
     "unorm8": "8 bits from 0 to 1",
@@ -55,10 +56,7 @@ class RaySetup(Switches):
         str,
         Word(
             "what happens where the exit's target has x and y of 0: mostly, where nothing was drawn",
-            {
-                "walked": "the ray is walked as any other",
-                "left": "the fragment is transparent black, seed 002",
-            },
+            {"walked": "the ray is walked as any other", "left": "the fragment is transparent black, seed 002"},
         ),
     ] = "walked"
     format: Annotated[str, Word("what a coordinate target holds", STORED)] = "float"
@@ -114,7 +112,7 @@ class Stepping(Switches):
                 "length-after": "the length walked is at least the ray's, after a sample",
                 "length-left": "no length is left, before a sample",
                 "outside": "a coordinate is below 0 or above 1, after a sample",
-                "outside-above": "a coordinate is above 1, after a sample; the faces at 0 are missed",
+                "outside-above": "a coordinate of the sample just taken is above 1: the faces at 0 are missed",
             },
         ),
     ] = "length-before"
@@ -254,6 +252,14 @@ class TableTexture(Switches):
 
     size: Annotated[int, Whole("entries along the value", low=2, high=1 << 16)] = 256
     rows: Annotated[int, Whole("entries along the gradient magnitude, 1 for none", low=1, high=4096)] = 1
+    steepest: Annotated[
+        float | None,
+        Real(
+            "the gradient magnitude, in value units per world unit, that v = 1 stands for when rows are baked "
+            "(None: that of |g| = 1 in a gradient texture)",
+            low=1e-30,
+        ),
+    ] = None
     format: Annotated[str, Word("what an entry holds", STORED)] = "unorm8"
     filter: Annotated[
         str,
@@ -325,9 +331,9 @@ class SampleOpacity(Switches):
         float | None,
         Real("the factor (None: 1 for 'as-is' and 'corrected', else mean side / unit distance)"),
     ] = None
-    by_gradient: Annotated[float, Real("what the gradient's magnitude multiplies it by; 0: it does not")] = (
-        0.0
-    )
+    by_gradient: Annotated[
+        float, Real("the factor by which |g| of a gradient texture multiplies it; 0: it does not")
+    ] = 0.0
 
 
 @dataclass(frozen=True)
@@ -340,7 +346,7 @@ class Lighting(Switches):
             "how lights and the material meet",
             {
                 "none": "colours are taken as they are",
-                "lit": "the scene's lights and material, as volref's own lit volumes have it",
+                "lit": "the scene's lights and material, in the world, as volref's own lit volumes have it",
                 "cej": "seed 004: the whole illumination times the colour; Blinn-Phong has 4 shininess",
             },
         ),
@@ -353,11 +359,42 @@ class Lighting(Switches):
             {
                 "none": "nowhere",
                 "central": "central differences of the texture, one voxel to each side",
-                "sobel-bytes": "Sobel's operator over 27, minus, in bytes round((g + 1) / 2 255), border 128",
-                "sobel-bytes-printed": "the same with seed 004's misprint in the z kernel",
+                "sobel-bytes": "a texture of value and gradient: minus Sobel's operator over 27, border 0",
+                "sobel-bytes-printed": "the same with the misprint in the z kernel of seed 004's code",
             },
         ),
     ] = "none"
+    zero: Annotated[
+        str,
+        Word(
+            "how a gradient g lies in the bytes of such a texture",
+            {
+                "half": "(g + 1) / 2 255: no byte is 0, and 128 is read as 1 / 255, seed 004",
+                "exact": "128 + 127 g: byte 128 is read as 0",
+            },
+        ),
+    ] = "exact"
+    flat: Annotated[
+        str,
+        Word(
+            "what a sample without a gradient gets, from a texture that holds gradients",
+            {
+                "ambient": "no diffuse and no specular light, where the gradient is shorter than 0.001",
+                "skipped": "nothing: it is left out, where the gradient's length is exactly 0, seed 004",
+            },
+        ),
+    ] = "ambient"
+    space: Annotated[
+        str,
+        Word(
+            "where model 'cej' has its positions, normals and directions",
+            {
+                "world": "in the world",
+                "texture": "in texture space, normals per voxel: skewed unless voxels are cubes and the "
+                "volume is one, seed 004",
+            },
+        ),
+    ] = "world"
 
 
 @dataclass(frozen=True)
@@ -398,8 +435,8 @@ class MeshCut(Switches):
         Word(
             "what the volume's pass knows of meshes",
             {
-                "none": "nothing, and none are drawn",
-                "distance": "the world distance of the nearest one: the ray ends there",
+                "none": "nothing: scenes with meshes are refused",
+                "distance": "the world distance of the nearest one: a slab's ray ends there",
                 "depth": "a depth in an RGBA8 target, compared at each step",
             },
         ),
@@ -409,8 +446,8 @@ class MeshCut(Switches):
         Word(
             "what depth is compared",
             {
-                "linear": "(view distance - near) / (far - near)",
-                "window-over-w": "window z / clip w, which is not linear along a ray",
+                "linear": "(distance along the view - near) / (far - near)",
+                "window-over-w": "1 - window z / clip w, which is not linear along a ray, seed 000",
             },
         ),
     ] = "linear"
@@ -419,7 +456,7 @@ class MeshCut(Switches):
         Word(
             "how a depth lies in four bytes",
             {
-                "exact": "it is not packed, but held in 64-bit floating point",
+                "exact": "not at all: its target is one of floats",
                 "printed": "digits k / 256 in bytes k / 255: no better than 8 bits, seed 000",
                 "working": "digits times 256 / 255, and back",
             },
@@ -445,6 +482,7 @@ class MeshCut(Switches):
             },
         ),
     ] = "over"
+    format: Annotated[str, Word("what the target of the meshes' colours holds", STORED)] = "unorm8"
 
 
 @dataclass(frozen=True)
@@ -455,9 +493,21 @@ class Output(Switches):
         str,
         Word(
             "how light is squeezed",
-            {"none": "not at all", "reinhard": "c / (1 + c), on the accumulated colour"},
+            {
+                "none": "not at all",
+                "reinhard": "c / (1 + c)",
+                "artistic": "VPT's: between `low` and `high`, towards grey by `saturation`, bent at `mid`",
+            },
         ),
     ] = "none"
+    low: Annotated[float, Real("light that tone map 'artistic' makes black", low=-1e6, high=1e6)] = 0.0
+    mid: Annotated[
+        float, Real("light between them; half-way, 'artistic' bends nothing", low=-1e6, high=1e6)
+    ] = 0.5
+    high: Annotated[float, Real("light that tone map 'artistic' makes white", low=-1e6, high=1e6)] = 1.0
+    saturation: Annotated[
+        float, Real("share of colour that 'artistic' keeps; 0 is grey", low=-1e6, high=1e6)
+    ] = 1.0
     gamma: Annotated[float, Real("colours are raised to 1 / gamma", low=0.01, high=100)] = 1.0
     blend: Annotated[
         str,
@@ -468,10 +518,23 @@ class Output(Switches):
                 "premultiplied": "ONE, ONE_MINUS_SRC_ALPHA",
                 "straight": "SRC_ALPHA, ONE_MINUS_SRC_ALPHA",
                 "additive-alpha": "SRC_ALPHA, ONE_MINUS_SRC_ALPHA; ONE, ONE for alpha",
-                "shader": "the shader itself puts it over the background",
+                "shader": "not at all: the shader makes C + (1 - A) b^gamma of background b, alpha 1",
+                "shader-straight": "the same with A C for C, the base of seed 003",
+                "environment": "not at all: the shader adds 1 - A of what is there, none for A > 1, seed 004",
             },
         ),
     ] = "premultiplied"
+    missed: Annotated[
+        str,
+        Word(
+            "what a pixel holds whose ray misses the box",
+            {
+                "clear": "the clear colour: the box alone is drawn, or such fragments are discarded",
+                "black": "opaque black: every pixel is drawn",
+                "transparent": "transparent black: every pixel is drawn",
+            },
+        ),
+    ] = "clear"
     discard_below: Annotated[
         float | None, Real("alpha below which nothing is drawn (None: none)", high=1.0)
     ] = None
@@ -479,3 +542,10 @@ class Output(Switches):
     mean_format: Annotated[
         str | None, Word("what the running mean of frames holds (None: frames are not averaged)", STORED)
     ] = None
+
+    def __post_init__(self) -> None:
+        """Refuse a switch that breaks its rule, and a middle that is not between its ends."""
+        super().__post_init__()
+        if not self.low < self.mid < self.high:
+            message = f"output.low, mid and high must rise, got {self.low:g}, {self.mid:g} and {self.high:g}; "
+            raise SceneError(message + "sort them")

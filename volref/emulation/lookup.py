@@ -10,6 +10,7 @@ import numpy as np
 
 from volref.arrays import Floats
 from volref.emulation.device import Device
+from volref.emulation.gradient_volume import has_gradient_volume, unpacked
 from volref.emulation.pipeline import Pipeline
 from volref.emulation.slices import SlicePair, slice_pair
 from volref.emulation.uploads import Uploads, table_place, table_texture, volume_texture
@@ -18,10 +19,15 @@ from volref.workspace import Workspace
 
 
 class Found(NamedTuple):
-    """What samples have found: values (n,), and colours (4, n)."""
+    """What samples have found: values (n,), colours (4, n), and gradients (3, n) with their lengths (n,).
+
+    Gradients are those of a gradient volume: minus the gradient per voxel, see there.
+    """
 
     value: Floats
     color: Floats
+    gradient: Floats | None = None
+    magnitude: Floats | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,6 +56,9 @@ def look_up(textures: Textures, position: Floats, work: Workspace) -> Found:
         if order == "pre":
             return Found(found[3], found)
         value = _value_of(textures, found)
+        if has_gradient_volume(textures.pipeline.lighting):
+            gradient, magnitude = unpacked(found[1:], textures.pipeline.lighting)
+            return Found(value, classified(textures, value, work, magnitude), gradient, magnitude)
         return Found(value, classified(textures, value, work))
     pair = slice_pair(textures.pipeline.volume, textures.size, textures.tiles, position)
     if order == "per-slice":
@@ -66,9 +75,13 @@ def look_up(textures: Textures, position: Floats, work: Workspace) -> Found:
     return Found(value, classified(textures, value, work))
 
 
-def classified(textures: Textures, value: Floats, work: Workspace) -> Floats:
-    """Return the table's colour (4, n) of values (n,)."""
+def classified(
+    textures: Textures, value: Floats, work: Workspace, magnitude: Floats | None = None
+) -> Floats:
+    """Return the table's colour (4, n) of values (n,), and of |g| (n,) as its v; without it v is 1/2."""
     place = table_place(textures.pipeline.table, value)
+    if magnitude is not None:
+        return fetch(textures.table, (place, magnitude), work)
     half = work.get("half", len(place), place.dtype)
     half.fill(0.5)
     return fetch(textures.table, (place, half), work)

@@ -32,7 +32,10 @@ Shader: TypeAlias = Callable[[Floats, Found, Indices], Floats]
 
 
 class Cut(NamedTuple):
-    """Opaque meshes as the loop sees them: depth at the entry, per step and of the surface, all (R,)."""
+    """Opaque meshes as the loop sees them: depth at the entry, per step and of the surface, all (R,).
+
+    `early`: the ray ends where its depth comes within a step of the surface's, not where it reaches it.
+    """
 
     depth: Floats
     step: Floats
@@ -84,7 +87,7 @@ Observer: TypeAlias = Callable[[Sample], None]
 
 @dataclass(eq=False)
 class _Walk:
-    """What changes from iteration to iteration, of rays `ray` (n,)."""
+    """What changes from iteration to iteration, of rays `ray` (n,); `walked` is what is left for "length-left"."""
 
     ray: Indices
     paths: Paths
@@ -94,6 +97,7 @@ class _Walk:
     color: Floats
     alpha: Floats
     weighted: Floats
+    depth: Floats
     over: Booleans
 
 
@@ -115,9 +119,9 @@ def _run(program: Program, rays: Indices, result: Marched, work: Workspace, obse
     for number in range(stepping.cap or LONGEST_LOOP):
         if not _left(walk, _ended_before(stepping, walk, number), number, result):
             return
+        if program.cut is not None and not _left(walk, _met(program.cut, walk, result), number, result):
+            return
         position, share = _place(program, walk, number)
-        if program.cut is not None:
-            _meet(program.cut, walk, number, result)
         found = look_up(program.textures, position, work)
         if program.shade is not None:
             found = found._replace(color=program.shade(position, found, walk.ray))
@@ -127,7 +131,7 @@ def _run(program: Program, rays: Indices, result: Marched, work: Workspace, obse
             seen = Sample(number, walk.ray, position, found, opacity, share, walk.color, walk.alpha)
             observe(seen)
         _advance(stepping, walk)
-        if not _left(walk, _ended_after(stepping, walk), number + 1, result):
+        if not _left(walk, _ended_after(stepping, walk, position), number + 1, result):
             return
     _left(walk, np.ones_like(walk.over), stepping.cap or LONGEST_LOOP, result)
 
@@ -142,8 +146,11 @@ def _start(program: Program, rays: Indices) -> _Walk:
         walked = paths.step * offset
     elif stepping.advance == "add":
         position = paths.entry + paths.delta * offset
+    if stepping.end == "length-left":
+        walked = paths.length
     zeros = (np.zeros((3, count), kind), np.zeros(count, kind), np.zeros(count, kind))
-    return _Walk(rays, paths, offset, position, walked, *zeros, np.zeros(count, np.bool_))
+    depth = walked if program.cut is None else program.cut.depth[rays]
+    return _Walk(rays, paths, offset, position, walked, *zeros, depth, np.zeros(count, np.bool_))
 
 
 def _left(walk: _Walk, ended: Booleans, samples: int, result: Marched) -> bool:
@@ -171,7 +178,7 @@ def _drop(walk: _Walk) -> None:
     """Drop the rays that are over from the arrays."""
     kept = np.flatnonzero(~walk.over)
     walk.paths = walk.paths.take(kept)
-    for name in ("ray", "offset", "position", "walked", "color", "alpha", "weighted", "over"):
+    for name in ("ray", "offset", "position", "walked", "color", "alpha", "weighted", "depth", "over"):
         setattr(walk, name, np.take(getattr(walk, name), kept, axis=-1))
 
 
@@ -183,7 +190,7 @@ def _ended_before(stepping: Stepping, walk: _Walk, number: int) -> Booleans:
     if stepping.end == "parameter":
         return ~(walk.walked < 1)
     if stepping.end == "length-left":
-        return ~(paths.length - walk.walked > 0)
+        return ~(walk.walked > 0)
     if stepping.end == "length-before":
         begin = kind(number) * paths.step
         if stepping.last_step == "dropped":
@@ -211,18 +218,20 @@ def _place(program: Program, walk: _Walk, number: int) -> tuple[Floats, Floats |
 def _advance(stepping: Stepping, walk: _Walk) -> None:
     if stepping.advance == "add":
         walk.position = walk.position + walk.paths.delta
-    if stepping.advance == "parameter" or stepping.end in ("length-after", "length-left"):
+    if stepping.end == "length-left":
+        walk.walked = walk.walked - walk.paths.step
+    elif stepping.advance == "parameter" or stepping.end == "length-after":
         walk.walked = walk.walked + walk.paths.step
 
 
-def _ended_after(stepping: Stepping, walk: _Walk) -> Booleans:
-    """Tell which rays end after an iteration, by where they have got to or by their alpha."""
+def _ended_after(stepping: Stepping, walk: _Walk, sampled: Floats) -> Booleans:
+    """Tell which rays end after an iteration at `sampled`, by where they have got to or by their alpha."""
     if stepping.end == "length-after":
         ended: Booleans = np.asarray(walk.walked >= walk.paths.length)
     elif stepping.end == "outside":
         ended = np.any((walk.position > 1) | (walk.position < 0), axis=0)
     elif stepping.end == "outside-above":
-        ended = np.any(walk.position > 1, axis=0)
+        ended = np.any(sampled > 1, axis=0)
     else:
         ended = np.zeros(len(walk.ray), np.bool_)
     if stepping.opaque_at is not None:
@@ -232,14 +241,13 @@ def _ended_after(stepping: Stepping, walk: _Walk) -> Booleans:
     return ended
 
 
-def _meet(cut: Cut, walk: _Walk, number: int, result: Marched) -> None:
-    """End the rays that have reached a surface before the sample that they would take now."""
-    depth, step, surface = (part[walk.ray] for part in cut[:3])
-    at = depth + step * depth.dtype.type(number)
-    reached = (at - surface > -step if cut.early else at >= surface) & ~walk.over
-    result.hit[walk.ray[reached]] = True
-    _put_down(walk, reached, number, result)
-    walk.over |= reached
+def _met(cut: Cut, walk: _Walk, result: Marched) -> Booleans:
+    """Tell which rays have reached a surface before the sample that they would take now, and go a step on."""
+    step, surface = cut.step[walk.ray], cut.surface[walk.ray]
+    reached = walk.depth - surface > -step if cut.early else walk.depth >= surface
+    result.hit[walk.ray[reached & ~walk.over]] = True
+    walk.depth = walk.depth + step
+    return np.asarray(reached)
 
 
 def _accumulate(program: Program, walk: _Walk, found: Found, opacity: Floats) -> None:

@@ -17,6 +17,7 @@ import numpy as np
 from volref.arrays import Floats, Indices
 from volref.emulation.box import Box
 from volref.emulation.device import Device
+from volref.emulation.lookup import Found
 from volref.emulation.paths import Paths
 from volref.emulation.pipeline import Pipeline
 from volref.scene.scene import Scene
@@ -29,10 +30,17 @@ class OpacityRule:
     source: str
     corrected: bool
     scale: Floats
+    by_gradient: float = 0.0
 
-    def opacity(self, alpha: Floats, value: Floats, ray: Indices, share: Floats | None) -> Floats:
+    def opacity(self, found: Found, ray: Indices, share: Floats | None) -> Floats:
         """Return the opacity (n,) of samples on rays `ray` (n,) whose step is `share` (n,) of a whole one."""
-        opacity = value if self.source == "value" else alpha
+        opacity = self._by_step(found.value if self.source == "value" else found.color[3], ray, share)
+        if not self.by_gradient:
+            return opacity
+        assert found.magnitude is not None
+        return np.asarray(opacity * (found.magnitude * opacity.dtype.type(self.by_gradient)))
+
+    def _by_step(self, opacity: Floats, ray: Indices, share: Floats | None) -> Floats:
         scale = self.scale if len(self.scale) == 1 else self.scale[ray]
         if share is not None:
             scale = scale * share.astype(opacity.dtype)
@@ -54,7 +62,8 @@ def opacity_rule(scene: Scene, pipeline: Pipeline, box: Box, paths: Paths, devic
         scale = factor * paths.texture_step
     elif switches.rule == "corrected":
         scale = factor * paths.world_step / scene.transfer.unit_distance
-    return OpacityRule(switches.source, switches.rule == "corrected", scale.astype(kind))
+    corrected = switches.rule == "corrected"
+    return OpacityRule(switches.source, corrected, scale.astype(kind), switches.by_gradient)
 
 
 def factor_of(scene: Scene, pipeline: Pipeline, box: Box) -> float:

@@ -1,8 +1,8 @@
 """`emulate`: the conductor of an emulation, pass by pass.
 
 uploads --> coordinate targets --> ends of rays --> paths --> the loop --> fragment colours --> canvas
-                                                      ^
-                                        mesh targets -+
+                                        ^                         ^                               ^
+            mesh targets ---------------+-------------------------+-------------------------------+
 """
 
 import time
@@ -14,17 +14,31 @@ from numpy.typing import ArrayLike
 
 from volref.arrays import Floats, float_array, whole_number
 from volref.emulation.box import Box, box_of
-from volref.emulation.canvas import cleared, draw, fragment_colors, mean_of_frames, store, tone_mapped
+from volref.emulation.canvas import (
+    cleared,
+    draw,
+    fragment_colors,
+    mean_of_frames,
+    missed,
+    over_environment,
+    store,
+    tone_mapped,
+)
 from volref.emulation.catalogue import named
+from volref.emulation.composition import behind_all, distance_shown, met_in_loop
+from volref.emulation.depths import cut_rays, mesh_targets, surface_colors
 from volref.emulation.device import Device
 from volref.emulation.entering import ends_of_rays
+from volref.emulation.gradient_volume import has_gradient_volume
 from volref.emulation.lookup import Textures, textures_of
-from volref.emulation.marching import Marched, Program, march
+from volref.emulation.marching import Cut, Marched, Program, Shader, march
+from volref.emulation.meshes import Surfaces, check_meshes, distances, surfaces_of
 from volref.emulation.opacity import OpacityRule, opacity_rule
 from volref.emulation.paths import Ends, Paths, paths_of
 from volref.emulation.pipeline import Pipeline
 from volref.emulation.result import Emulation
-from volref.emulation.uploads import Uploads, uploads_of
+from volref.emulation.shading import check_gradients, shader_of
+from volref.emulation.uploads import Uploads, decoded_or, uploads_of
 from volref.errors import SceneError
 from volref.scene.scene import Scene
 from volref.scene.volume import Volume
@@ -80,21 +94,23 @@ def emulate(
         if program.output.mean_format is not None:
             mean = mean_of_frames(mean, canvas, number, program.output, machine)
             passes |= {"frame": canvas, "running_mean": mean}
-            canvas = store(tone_mapped(mean, program.output), program.output.format, machine)
+            canvas = store(tone_mapped(mean, program.output, scene.background), program.output.format, machine)
     passes["canvas"] = canvas
     size = scene.height, scene.width
     samples = np.zeros(size, np.int64)
     samples.reshape(-1)[drawing.ends.pixel] = marched.samples
     images = {name: _image(target, size) for name, target in passes.items()}
+    distance = distance_shown(drawing.distance, drawing.ends.pixel, marched.alpha, marched.hit)
     seconds = time.perf_counter() - began
-    return Emulation(images["canvas"], drawing.distance, images, samples, seconds, program, machine)
+    return Emulation(images["canvas"], distance, images, samples, seconds, program, machine)
 
 
 @dataclass(frozen=True, eq=False)
 class Drawing:
     """All that a program has in hand when its last pass begins; what `trace` and `accept` look into too.
 
-    targets: what it has drawn so far, by name.  distance: see `Emulation`.
+    targets: what it has drawn so far, by name.  surfaces: the nearest fragments of the meshes, at the world
+    distance (H, W), +inf elsewhere.  cut: what the loop knows of them.
     """
 
     scene: Scene
@@ -107,12 +123,15 @@ class Drawing:
     paths: Paths
     rule: OpacityRule
     targets: Mapping[str, Floats]
+    surfaces: Surfaces
     distance: Floats
+    cut: Cut | None
+    shade: Shader | None
 
     def program(self, offset: Floats) -> Program:
         """Return the loop for start offsets (H * W,)."""
-        kind = self.device.control_type
-        return Program(self.textures, self.rule, self.paths, offset[self.ends.pixel].astype(kind))
+        start = offset[self.ends.pixel].astype(self.device.control_type)
+        return Program(self.textures, self.rule, self.paths, start, self.cut, self.shade)
 
 
 def prepare(scene: Scene, pipeline: Pipeline, device: Device) -> Drawing:
@@ -124,25 +143,47 @@ def prepare(scene: Scene, pipeline: Pipeline, device: Device) -> Drawing:
         If the scene holds what the program cannot draw.
     """
     check_drawable(scene, pipeline)
+    check_meshes(scene, pipeline)
+    check_gradients(scene, pipeline)
     box, uploads = box_of(scene), uploads_of(scene, pipeline)
-    ends, targets = ends_of_rays(scene, pipeline, box, device)
+    surfaces, cut = surfaces_of(scene, device), None
+    targets = mesh_targets(scene, pipeline, box, device, surfaces)
+    ends, coordinates = ends_of_rays(scene, pipeline, box, device, targets.get("mesh_distance"))
+    if pipeline.meshes.kind == "depth":
+        ends, cut = cut_rays(scene, pipeline, box, device, surfaces, targets, ends)
+    targets |= coordinates
+    if has_gradient_volume(pipeline.lighting):
+        targets = {"gradient_volume": decoded_or(uploads.volume, device.values_type)} | targets
     paths = paths_of(ends, scene, pipeline, box, device)
     rule = opacity_rule(scene, pipeline, box, paths, device)
     distance = np.full((scene.height, scene.width), np.inf)
+    distance.reshape(-1)[surfaces.pixel] = distances(surfaces, scene.camera)
     textures = textures_of(uploads, pipeline, device)
-    return Drawing(scene, pipeline, device, box, uploads, textures, ends, paths, rule, targets, distance)
+    shade = shader_of(scene, textures, box, ends)
+    ready = textures, ends, paths, rule, targets, surfaces, distance, cut, shade
+    return Drawing(scene, pipeline, device, box, uploads, *ready)
 
 
 def drawn(drawing: Drawing, marched: Marched) -> Floats:
     """Return the target (H * W, 4) of the last pass: the frame, or the canvas."""
     output, device = drawing.pipeline.output, drawing.device
     canvas = cleared(drawing.scene, output, device)
-    fragments = fragment_colors(marched, drawing.pipeline.accumulation)
+    fragments, pixel = fragment_colors(marched, drawing.pipeline.accumulation), drawing.ends.pixel
+    surfaces = drawing.surfaces
+    if drawing.cut is not None:
+        canvas[surfaces.pixel] = store(surface_colors(surfaces, device), output.format, device)
+        objects = drawing.targets["mesh_color"][pixel]
+        fragments = met_in_loop(fragments, marched.hit, objects, drawing.pipeline.meshes.composition)
+    elif len(surfaces.pixel):
+        fragments, pixel = behind_all(fragments, pixel, drawing.targets["mesh_color"], surfaces.pixel)
+    if output.blend == "environment":
+        fragments = over_environment(fragments, marched.alpha, canvas[pixel], drawing.pipeline.accumulation)
     if output.mean_format is None:
-        fragments = tone_mapped(fragments, output)
-    draw(canvas, drawing.ends.pixel, fragments, output, device)
+        fragments = tone_mapped(fragments, output, drawing.scene.background)
+    draw(canvas, pixel, fragments, output, device)
     blank = drawing.ends.blank
     draw(canvas, blank, np.zeros((len(blank), 4), fragments.dtype), output, device)
+    missed(canvas, np.concatenate([pixel, blank]), output)
     return canvas
 
 

@@ -63,12 +63,20 @@ def paths_of(ends: Ends, scene: Scene, pipeline: Pipeline, box: Box, device: Dev
     count = np.full(len(length), stepping.steps)
     with np.errstate(divide="ignore", invalid="ignore"):
         if stepping.rule == "count":
-            delta, step = ray / kind(stepping.steps), np.full_like(length, kind(1) / kind(stepping.steps))
+            share = kind(1) / kind(stepping.steps)
+            # Programs of this kind have the number of steps in their text: it is known to the compiler.
+            multiplied = device.constant_divisor == "multiplied"
+            delta = ray * share if multiplied else ray / kind(stepping.steps)
+            step = np.full_like(length, share)
             length = np.ones_like(length)
         elif stepping.rule == "texture-length":
             size = kind(stepping.length or 1.0 / stepping.steps)
-            delta = ray / length * size
-            step = vector_length(delta)
+            if stepping.end == "length-left":
+                # The rest of the ray is counted down by the step's nominal length.
+                delta, step = size * ray / length, np.full_like(length, size)
+            else:
+                delta = ray / length * size
+                step = vector_length(delta)
         elif stepping.rule == "voxel-count":
             voxels = vector_length(ray * np.array(_size(scene), kind)[:, None])
             count = (voxels / kind(stepping.length or 1.0) + kind(0.5)).astype(np.int64)

@@ -17,6 +17,7 @@ import numpy as np
 
 from volref.arrays import Floats, Numbers
 from volref.emulation.device import Device
+from volref.emulation.gradient_volume import SOBEL_GAIN, has_gradient_volume, with_gradient
 from volref.emulation.groups import TableTexture, VolumeTexture
 from volref.emulation.pipeline import Pipeline
 from volref.formats import codes_of, decoded, stored
@@ -26,7 +27,7 @@ from volref.scene.transfer import TransferFunction
 from volref.scene.transfer2d import TransferFunction2D
 from volref.scene.volume import Volume
 from volref.stages.classify import classify, lookup_table, segment_opacity
-from volref.stages.lookup2d import lookup_2d
+from volref.stages.lookup2d import gradient_factor, lookup_2d
 from volref.stages.textures import Texture, fetch
 from volref.workspace import Workspace
 
@@ -55,7 +56,7 @@ def uploads_of(scene: Scene, pipeline: Pipeline) -> Uploads:
     assert isinstance(scene.volume, Volume)
     assert scene.transfer is not None
     domain = domain_of(scene, pipeline)
-    entries = baked_table(scene, pipeline.table, domain)
+    entries = baked_table(scene, pipeline, domain)
     if pipeline.table.srgb:
         entries[..., :3] = encode_srgb(entries[..., :3])
     table = _as_uploaded(entries, pipeline.table.format)
@@ -69,6 +70,8 @@ def uploads_of(scene: Scene, pipeline: Pipeline) -> Uploads:
         channels = np.moveaxis(found, 0, -1).reshape(*unit.shape, 4)
     tiles = tiles_of(pipeline.volume, len(unit))
     texels = _texels(channels, pipeline.volume.format)
+    if has_gradient_volume(pipeline.lighting):
+        texels = with_gradient(texels, pipeline.lighting, pipeline.volume.format)
     if pipeline.volume.layout == "atlas":
         texels = atlas_of(texels, pipeline.volume, tiles)
     return Uploads(texels, table, domain, scene.volume.size, tiles)
@@ -92,30 +95,50 @@ def domain_of(scene: Scene, pipeline: Pipeline) -> tuple[float, float]:
     return float(low), float(low) + 1.0
 
 
-def baked_table(scene: Scene, table: TableTexture, domain: tuple[float, float]) -> Floats:
+def baked_table(scene: Scene, pipeline: Pipeline, domain: tuple[float, float]) -> Floats:
     """Return the transfer function as entries (rows, n, 4): straight colour, opacity of a unit distance.
 
-    Of a function of the value alone all rows are equal.  One of value and magnitude has its rows spread over
-    its own magnitudes.
+    Of a function of the value alone all rows are equal.
     """
-    n = table.size
-    values = domain[0] + (domain[1] - domain[0]) * baked_at(table)
-    transfer = scene.transfer
+    table, transfer = pipeline.table, scene.transfer
+    along = domain[0] + (domain[1] - domain[0]) * baked_at(table)
+    values = np.tile(along, table.rows)
+    up = (np.arange(table.rows) + 0.5) / table.rows * steepest(scene, table, domain)
+    magnitudes = np.repeat(up, table.size)
     if isinstance(transfer, TransferFunction2D):
-        low, high = transfer.magnitude_domain
-        magnitudes = low + (high - low) * (np.arange(table.rows) + 0.5) / table.rows
-        colors, opacity = lookup_2d(transfer, np.tile(values, table.rows), np.repeat(magnitudes, n))
+        colors, opacity = lookup_2d(transfer, values, magnitudes)
     else:
         assert transfer is not None
         work = Workspace()
-        found, strength = classify(lookup_table(transfer, domain), values, work)
+        colors, strength = classify(lookup_table(transfer, domain), values, work)
         if transfer.interpolation == "extinction":
             strength = segment_opacity(transfer, strength, transfer.unit_distance)
-        colors, opacity = np.tile(found, table.rows), np.tile(strength, table.rows)
-    entries = np.concatenate([colors, opacity[None]]).T.reshape(table.rows, n, 4)
+        opacity = strength * gradient_factor(transfer, magnitudes)
+    entries = np.concatenate([colors, opacity[None]]).T.reshape(table.rows, table.size, 4)
     if table.last_column == "empty":
         entries[:, -1] = 0.0
     return np.ascontiguousarray(entries)
+
+
+def steepest(scene: Scene, table: TableTexture, domain: tuple[float, float]) -> float:
+    """Return the magnitude, in value units per world unit, that v = 1 of a table stands for.
+
+    The table's own; else that of |g| = 1 in a gradient volume: a field that grows by 27 / 32 of the domain
+    per voxel, of mean spacing.
+
+    Examples
+    --------
+    >>> import volref as vr
+    >>> transfer = vr.TransferFunction([0, 64], [(1, 1, 1)] * 2, [0, 1])
+    >>> camera = vr.Camera.look_at((0, 0, 9), (0, 0, 0), (0, 1, 0), 30, 1, 20)
+    >>> volume = vr.Volume(np.zeros((4, 4, 4)), spacing=(1, 2, 3))
+    >>> steepest(vr.Scene(volume, transfer, camera, 1, 1), TableTexture(rows=4), (0, 64))
+    27.0
+    """
+    if table.steepest is not None:
+        return table.steepest
+    assert isinstance(scene.volume, Volume)
+    return (domain[1] - domain[0]) / SOBEL_GAIN / float(np.mean(scene.volume.spacing))
 
 
 def baked_at(table: TableTexture) -> Floats:

@@ -2,11 +2,11 @@
 
 from functools import cache
 
-from volref.emulation.catalogue import barbagallo, baseline, congote
+from volref.emulation.catalogue import arbelaz, barbagallo, baseline, burkalo, cej, congote, vpt, x3dom
 from volref.emulation.pipeline import Pipeline
 from volref.errors import SceneError
 
-MODULES = (baseline, congote, barbagallo)
+MODULES = (baseline, arbelaz, congote, barbagallo, cej, vpt, x3dom, burkalo)
 
 
 @cache
