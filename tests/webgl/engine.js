@@ -14,11 +14,14 @@
   };
 
   // Name: [internal format, format, type], as the names of constants; WebGL 1 has no sized formats.
+  const UNSIZED = {
+    luminance8: ["LUMINANCE", "LUMINANCE", "UNSIGNED_BYTE"],
+    alpha8: ["ALPHA", "ALPHA", "UNSIGNED_BYTE"],
+    luminance_alpha8: ["LUMINANCE_ALPHA", "LUMINANCE_ALPHA", "UNSIGNED_BYTE"],
+  };
   const FORMATS = {
     1: {
-      luminance8: ["LUMINANCE", "LUMINANCE", "UNSIGNED_BYTE"],
-      alpha8: ["ALPHA", "ALPHA", "UNSIGNED_BYTE"],
-      luminance_alpha8: ["LUMINANCE_ALPHA", "LUMINANCE_ALPHA", "UNSIGNED_BYTE"],
+      ...UNSIZED,
       rgb8: ["RGB", "RGB", "UNSIGNED_BYTE"],
       rgba8: ["RGBA", "RGBA", "UNSIGNED_BYTE"],
       r32f: ["LUMINANCE", "LUMINANCE", "FLOAT"],
@@ -26,9 +29,7 @@
       rgba16f: ["RGBA", "RGBA", "HALF_FLOAT_OES"],
     },
     2: {
-      luminance8: ["LUMINANCE", "LUMINANCE", "UNSIGNED_BYTE"],
-      alpha8: ["ALPHA", "ALPHA", "UNSIGNED_BYTE"],
-      luminance_alpha8: ["LUMINANCE_ALPHA", "LUMINANCE_ALPHA", "UNSIGNED_BYTE"],
+      ...UNSIZED,
       r8: ["R8", "RED", "UNSIGNED_BYTE"],
       rg8: ["RG8", "RG", "UNSIGNED_BYTE"],
       rgb8: ["RGB8", "RGB", "UNSIGNED_BYTE"],
@@ -42,8 +43,7 @@
   };
 
   const ARRAYS = { UNSIGNED_BYTE: Uint8Array, FLOAT: Float32Array, HALF_FLOAT: Uint16Array, HALF_FLOAT_OES: Uint16Array };
-  // The one constant of WebGL 1 that belongs to an extension.
-  const codeOf = (gl, type) => (type === "HALF_FLOAT_OES" ? 0x8d61 : gl[type]);
+  const codeOf = (gl, type) => (type === "HALF_FLOAT_OES" ? 0x8d61 : gl[type]); // an extension's own
 
   const contexts = {};
 
@@ -68,9 +68,8 @@
   function check(gl, doing) {
     const code = gl.getError();
     if (code === gl.NO_ERROR) return;
-    const names = ["INVALID_ENUM", "INVALID_VALUE", "INVALID_OPERATION", "INVALID_FRAMEBUFFER_OPERATION",
-      "OUT_OF_MEMORY", "CONTEXT_LOST_WEBGL"];
-    throw new Error(`${names.find((name) => gl[name] === code) ?? code} while ${doing}`);
+    const names = ["ENUM", "VALUE", "OPERATION", "FRAMEBUFFER_OPERATION"].map((name) => `INVALID_${name}`);
+    throw new Error(`${names.find((name) => gl[name] === code) ?? `GL error ${code}`} while ${doing}`);
   }
 
   function formatOf(context, name) {
@@ -144,8 +143,7 @@
     gl.bindFramebuffer(gl.FRAMEBUFFER, made.framebuffer);
     gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, made.texture, 0);
     if (depth) {
-      made.depth = gl.createRenderbuffer();
-      gl.bindRenderbuffer(gl.RENDERBUFFER, made.depth);
+      gl.bindRenderbuffer(gl.RENDERBUFFER, (made.depth = gl.createRenderbuffer()));
       gl.renderbufferStorage(gl.RENDERBUFFER, gl.DEPTH_STENCIL, width, height);
       gl.framebufferRenderbuffer(gl.FRAMEBUFFER, gl.DEPTH_STENCIL_ATTACHMENT, gl.RENDERBUFFER, made.depth);
     }
