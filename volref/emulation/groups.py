@@ -112,7 +112,7 @@ class Stepping(Switches):
                 "length-after": "the length walked is at least the ray's, after a sample",
                 "length-left": "no length is left, before a sample",
                 "outside": "a coordinate is below 0 or above 1, after a sample",
-                "outside-above": "a coordinate of the sample just taken is above 1: the faces at 0 are missed",
+                "outside-above": "a coordinate of the sample just taken is above 1; faces at 0 are missed",
             },
         ),
     ] = "length-before"
