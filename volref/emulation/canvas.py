@@ -5,7 +5,8 @@ F fragments; colours are (F, 4), the canvas is (H * W, 4).
 
 import numpy as np
 
-from volref.arrays import Booleans, Floats, Indices
+from volref.arrays import Booleans, Bytes, Floats, Indices
+from volref.emulation.blending import blended, blended_codes
 from volref.emulation.device import Device
 from volref.emulation.groups import Accumulation, Output
 from volref.emulation.lookup import mix
@@ -105,27 +106,15 @@ def draw(canvas: Floats, pixel: Indices, fragments: Floats, output: Output, devi
     if output.format == "unorm8":
         # Targets of whole numbers clamp colours before they blend them (OpenGL ES 3.0, section 4.1.7).
         fragments = np.clip(fragments, 0.0, 1.0)
+    if output.format == "unorm8" and device.blend == "integer":
+        codes = blended_codes(_bytes_of(fragments, device), _bytes_of(canvas[pixel], device), output.blend)
+        canvas[pixel] = decoded(codes, canvas.dtype)
+        return
     canvas[pixel] = store(blended(fragments, canvas[pixel], output.blend), output.format, device)
 
 
-def blended(source: Floats, behind: Floats, blend: str) -> Floats:
-    """Return what a blend state makes of fragments (F, 4) and what is behind them (F, 4).
-
-    Examples
-    --------
-    >>> half, red = np.array([[0.5, 0.5, 0.5, 0.5]]), np.array([[1.0, 0.0, 0.0, 1.0]])
-    >>> blended(half, red, "premultiplied").tolist(), blended(half, red, "straight").tolist()
-    ([[1.0, 0.5, 0.5, 1.0]], [[0.75, 0.25, 0.25, 0.75]])
-    """
-    alpha = source[:, 3:]
-    if blend in ("none", "environment", *IN_SHADER):
-        return source
-    if blend == "premultiplied":
-        return np.asarray(source + (1 - alpha) * behind)
-    mixed = source * alpha + (1 - alpha) * behind
-    if blend == "additive-alpha":
-        mixed[:, 3] = source[:, 3] + behind[:, 3]
-    return np.asarray(mixed)
+def _bytes_of(colors: Floats, device: Device) -> Bytes:
+    return codes_of(colors, 8, nan=1.0 if device.nan_stored == "one" else 0.0)
 
 
 def mean_of_frames(mean: Floats, frame: Floats, number: int, output: Output, device: Device) -> Floats:

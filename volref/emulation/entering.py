@@ -127,7 +127,7 @@ def _from_faces(scene: Scene, box: Box, device: Device) -> Ends:
     start = (
         np.broadcast_to(eye.astype(kind)[:, None], at_face.shape) if inside and eye is not None else at_face
     )
-    return Ends(fragments.pixel, start, start + direction)
+    return Ends(fragments.pixel, start, start + direction, along=direction)
 
 
 def _eye(scene: Scene, box: Box) -> Floats | None:

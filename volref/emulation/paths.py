@@ -22,14 +22,15 @@ class Ends:
     """Where rays enter and leave the box.
 
     pixel (R,): flat indices.  entry, exit (3, R): in the control type.  For programs that do not know the
-    exit it lies one unit of texture space behind the entry.  blank: pixels whose fragments are transparent
-    black without a ray.
+    exit it lies one unit of texture space behind the entry, and `along` (3, R) is that unit.  blank: pixels
+    whose fragments are transparent black without a ray.
     """
 
     pixel: Indices
     entry: Floats
     exit: Floats
     blank: Indices = field(default_factory=lambda: np.zeros(0, np.intp))
+    along: Floats | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +76,7 @@ def paths_of(ends: Ends, scene: Scene, pipeline: Pipeline, box: Box, device: Dev
                 # The rest of the ray is counted down by the step's nominal length.
                 delta, step = size * ray / length, np.full_like(length, size)
             else:
-                delta = ray / length * size
+                delta = (ray / length if ends.along is None else ends.along) * size
                 step = vector_length(delta)
         elif stepping.rule == "voxel-count":
             voxels = vector_length(ray * np.array(_size(scene), kind)[:, None])

@@ -9,9 +9,8 @@ uniform sampler2D colors;
 uniform vec3 eye;
 uniform float opacity_factor;
 uniform float light_factor;
+uniform float step_length;
 varying vec3 place;
-
-const float DIAGONAL = 1.4142;
 
 vec2 in_atlas(vec2 at, float slice) {
     float column = fract(slice / ACROSS);
@@ -31,7 +30,7 @@ void main() {
     vec3 direction = normalize(place - eye);
     bool inside = all(lessThan(eye, vec3(1.0))) && all(greaterThan(eye, vec3(0.0)));
     vec3 at = inside ? eye : place;
-    vec3 step_vector = direction * DIAGONAL / STEPS;
+    vec3 step_vector = direction * step_length;
     vec4 sum = vec4(0.0);
     for (float i = 0.0; i < STEPS; i += 1.0) {
         vec4 found = texture2D(colors, vec2(in_volume(at), 0.5));

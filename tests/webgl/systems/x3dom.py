@@ -36,6 +36,7 @@ def draw(
         "eye": eye,
         "opacity_factor": factor_of(scene, pipeline, box_of(scene)),
         "light_factor": pipeline.lighting.factor,
+        "step_length": pipeline.stepping.length,
     }
     drawing = Pass(
         program("x3dom.vertex", "x3dom.fragment", defines_of(pipeline, uploads)),
