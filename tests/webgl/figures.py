@@ -16,8 +16,9 @@ from volref.formats import codes_of
 class Figures:
     """Figures of one target, or of several taken together.
 
-    error (n,): largest difference of a drawn pixel's channels, in 1/255 for targets of bytes.  unexplained:
-    how many pixels are off by more than 1/255 and were not predicted to hang on a comparison.
+    error (n,): largest difference of a drawn pixel's channels, in 1/255 for targets of bytes; of floats beyond
+    1, which no screen shows but a formula that adds up to too much gives, in proportion to them.
+    unexplained: how many pixels are off by more than 1/255 and were not predicted to hang on a comparison.
     """
 
     bytes: bool
@@ -70,6 +71,8 @@ def figures(
     drawn = ((ours != empty) | (theirs != empty)).any(axis=-1)
     with np.errstate(invalid="ignore"):
         apart = np.abs(ours.astype(np.float64) - theirs.astype(np.float64))
+    if not whole:
+        apart /= np.fmax(1.0, np.abs(theirs))
     # NaN is equal to NaN and infinitely far from numbers; so is an infinity, and equal to itself.
     apart = np.where((ours == theirs) | (np.isnan(ours) & np.isnan(theirs)), 0.0, apart)
     error = np.where(np.isnan(apart), np.inf, apart).max(axis=-1)
