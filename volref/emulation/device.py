@@ -60,6 +60,13 @@ class Device(Switches):
             {"divided": "a division", "multiplied": "a product with the rounded reciprocal"},
         ),
     ] = "divided"
+    srgb: Annotated[
+        str,
+        Word(
+            "how a texture decodes sRGB",
+            {"curve": "by its curve", "cubic": "by Mesa's cubic in its place, up to 0.0012 beside it"},
+        ),
+    ] = "curve"
     blend: Annotated[
         str,
         Word(
@@ -123,6 +130,7 @@ PRESETS: dict[str, Device] = {
             weight_bits=8,
             result_bits=8,
             subpixel_bits=8,
+            srgb="cubic",
             blend="integer",
             fragment_position="float16",
         ),

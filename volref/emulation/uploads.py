@@ -64,7 +64,7 @@ def uploads_of(scene: Scene, pipeline: Pipeline) -> Uploads:
     unit = (scene.volume.values.astype(np.float64) - domain[0]) / (domain[1] - domain[0])
     channels = unit[..., None]
     if pipeline.table.order == "pre":
-        texture = Texture(np.asarray(_as_fetched(table, pipeline.table, np.float64)), pipeline.table.filter)
+        texture = Texture(np.asarray(_as_fetched(table, pipeline.table, Device(), np.float64)), pipeline.table.filter)
         place = table_place(pipeline.table, unit.reshape(-1))
         found = fetch(texture, (place, np.full_like(place, 0.5)), Workspace())
         channels = np.moveaxis(found, 0, -1).reshape(*unit.shape, 4)
@@ -196,7 +196,7 @@ def volume_texture(uploads: Uploads, pipeline: Pipeline, device: Device) -> Text
 
 def table_texture(uploads: Uploads, pipeline: Pipeline, device: Device) -> Texture:
     """Return the table's texture as a device samples it, without mip levels."""
-    texels = _as_fetched(uploads.table, pipeline.table, device.values_type)
+    texels = _as_fetched(uploads.table, pipeline.table, device, device.values_type)
     kind = "nearest" if pipeline.table.filter == "nearest" else "linear"
     return _texture(texels, kind, device, narrow=uploads.table.dtype == np.uint8 and not pipeline.table.srgb)
 
@@ -235,13 +235,29 @@ def decoded_or(texels: Numbers, kind: np.typing.DTypeLike) -> Floats:
     return decoded(texels, kind) if texels.dtype.kind == "u" else texels.astype(kind, copy=False)
 
 
-def _as_fetched(table: Numbers, switches: TableTexture, kind: np.typing.DTypeLike) -> Floats:
+def _as_fetched(
+    table: Numbers, switches: TableTexture, device: Device, kind: np.typing.DTypeLike
+) -> Floats:
     """Return a table's texels (1 or more rows, n, 4) as a fetch gives them."""
     texels = decoded_or(table, kind)
     if switches.srgb:
         texels = texels.copy()
-        texels[..., :3] = decode_srgb(texels[..., :3].astype(np.float64)).astype(kind)
+        codes = texels[..., :3].astype(np.float64)
+        texels[..., :3] = (decode_srgb if device.srgb == "curve" else mesa_srgb)(codes)
     return texels
+
+
+def mesa_srgb(codes: Floats) -> Floats:
+    """Return what Mesa makes of sRGB codes of 0..1 (lp_bld_format_srgb.c): a line up to 15 / 255, a cubic beyond.
+
+    Examples
+    --------
+    >>> codes = np.array([0.5, 1.0])
+    >>> mesa_srgb(codes).round(4).tolist(), decode_srgb(codes).round(4).tolist()
+    ([0.2148, 1.0], [0.214, 1.0])
+    """
+    cubic = 0.0023 + codes * (0.0030 + codes * (0.6935 + codes * 0.3012))
+    return np.where(codes <= 15 / 255, codes / 12.6, cubic)
 
 
 def _as_uploaded(entries: Floats, kind: str) -> Numbers:
