@@ -30,7 +30,9 @@ def focal_ends(scene: Scene, rule: str, box: Box, device: Device, surface: Float
     """
     camera, kind = scene.camera, device.control_type
     if camera.is_parallel:
-        message = f"camera must be a perspective one for pipeline.rays.direction {rule!r}, got a parallel one; "
+        message = (
+            f"camera must be a perspective one for pipeline.rays.direction {rule!r}, got a parallel one; "
+        )
         raise SceneError(message + "use a pipeline with 'eye'")
     eye = transform_points(box.texture_from_world, camera.world_from_view[:3, 3]).astype(kind)
     turn = (box.texture_from_world @ camera.world_from_view)[:3, :3].astype(kind)

@@ -256,9 +256,10 @@ def _accumulate(program: Program, walk: _Walk, found: Found, opacity: Floats) ->
     light, rule = pipeline.lighting.factor, pipeline.accumulation.rule
     kind = opacity.dtype.type
     if rule == "reversed-over":
-        behind = (kind(1) - opacity) * walk.alpha
-        walk.color = color[:3] * opacity * kind(light) + walk.color * behind
-        walk.alpha = opacity + behind
+        # Which sample is the last, and so in front, is decided by alpha's rounding to 1: control arithmetic.
+        walk.color = color[:3] * opacity * kind(light) + walk.color * ((kind(1) - opacity) * walk.alpha)
+        share = opacity.astype(walk.walked.dtype)
+        walk.alpha = share + (share.dtype.type(1) - share) * walk.alpha.astype(share.dtype)
         return
     weight = (kind(1) - walk.alpha) * opacity
     shining = weight if light == 1.0 else weight * kind(light)
