@@ -2,9 +2,9 @@
 
 A GPU program is full of them: is the ray at its end, is alpha at its threshold, is the surface met, does the
 pixel centre lie inside an edge, which byte is nearest.  Two correct machines may answer differently where the
-two sides are all but equal, and the pixel then differs by a whole sample.  They are found by drawing the scene
-again with the eye moved by a few millionths of the box and the threshold of alpha by as much: what stays the
-same within half an 8-bit step does not hang on a comparison.
+two sides are all but equal, and the pixel then differs by a whole sample.  They are found by drawing the
+scene again with the eye moved by a few millionths of the box and the threshold of alpha by as much: what
+stays the same within half an 8-bit step does not hang on a comparison.
 """
 
 import dataclasses
@@ -17,7 +17,8 @@ from numpy.typing import ArrayLike
 from volref.arrays import Booleans, Floats
 from volref.emulation.box import box_of
 from volref.emulation.device import Device
-from volref.emulation.passes import emulate
+from volref.emulation.passes import emulate, prepare
+from volref.emulation.paths import vector_length
 from volref.emulation.pipeline import Pipeline
 from volref.scene.camera import Camera
 from volref.scene.scene import Scene
@@ -44,10 +45,21 @@ def ambiguous(
     """
     base = _floating(pipeline)
     plain = emulate(scene, base, device, jitter, frames).rgba
-    found = np.zeros((scene.height, scene.width), np.bool_)
+    found = _without_direction(scene, base, device or Device())
     for moved, changed in _nudged(scene, base):
         found |= _differ(plain, emulate(moved, changed, device, jitter, frames).rgba)
     return found
+
+
+def _without_direction(scene: Scene, pipeline: Pipeline, device: Device) -> Booleans:
+    """Return the pixels (H, W) whose rays are so short that it is rounding whether they have a direction.
+
+    One whose ends are equal has none: it is NaN, and the next machine draws a sample there.
+    """
+    ends = prepare(scene, pipeline, device).ends
+    found = np.zeros(scene.height * scene.width, np.bool_)
+    found[ends.pixel] = vector_length(ends.exit - ends.entry) < NUDGE
+    return found.reshape(scene.height, scene.width)
 
 
 def _floating(pipeline: Pipeline) -> Pipeline:

@@ -56,7 +56,7 @@ class RaySetup(Switches):
         str,
         Word(
             "what happens where the exit's target has x and y of 0: mostly, where nothing was drawn",
-            {"walked": "the ray is walked as any other", "left": "the fragment is transparent black, seed 002"},
+            {"walked": "the ray is walked", "left": "the fragment is transparent black, seed 002"},
         ),
     ] = "walked"
     format: Annotated[str, Word("what a coordinate target holds", STORED)] = "float"

@@ -20,61 +20,61 @@ const float LAST_TILE = float(ACROSS * DOWN - 1);
 
 // Tiles are counted from the top row down, and v from the bottom up.
 vec2 in_atlas(vec2 at, float slice) {
-    float column = mod(slice, ACROSS_TILES);
-    float row = floor((LAST_TILE - slice) / ACROSS_TILES);
-    return vec2(at.x / ACROSS_TILES + column / ACROSS_TILES, at.y / DOWN_TILES + row / DOWN_TILES);
+  float column = mod(slice, ACROSS_TILES);
+  float row = floor((LAST_TILE - slice) / ACROSS_TILES);
+  return vec2(at.x / ACROSS_TILES + column / ACROSS_TILES, at.y / DOWN_TILES + row / DOWN_TILES);
 }
 
 // Colour of the value in one slice; the value itself is the alpha.
 vec4 in_slice(vec2 at, float slice) {
-    float value = texture2D(atlas, in_atlas(at, slice)).a;
-    return vec4(texture2D(colors, vec2(value, 1.0)).rgb, value);
+  float value = texture2D(atlas, in_atlas(at, slice)).a;
+  return vec4(texture2D(colors, vec2(value, 1.0)).rgb, value);
 }
 
 vec4 in_volume(vec3 at) {
-    float depth = at.z * LAST_SLICE;
-    float first = floor(depth);
-    float second = min(first + 1.0, LAST_SLICE);
-    vec4 before = in_slice(at.xy, first);
-    vec4 behind = in_slice(at.xy, second);
-    return mix(before, behind, mod(depth, 1.0));
+  float depth = at.z * LAST_SLICE;
+  float first = floor(depth);
+  float second = min(first + 1.0, LAST_SLICE);
+  vec4 before = in_slice(at.xy, first);
+  vec4 behind = in_slice(at.xy, second);
+  return mix(before, behind, mod(depth, 1.0));
 }
 
 void main() {
-    vec2 pixel = (clip.xy / clip.w + 1.0) / 2.0;
-    vec3 back = texture2D(exits, pixel).xyz;
+  vec2 pixel = (clip.xy / clip.w + 1.0) / 2.0;
+  vec3 back = texture2D(exits, pixel).xyz;
 #ifdef LEFT_WITHOUT_EXIT
-    if (back.x == 0.0 && back.y == 0.0) {
-        gl_FragColor = vec4(0.0);
-        return;
-    }
+  if (back.x == 0.0 && back.y == 0.0) {
+    gl_FragColor = vec4(0.0);
+    return;
+  }
 #endif
-    vec3 ray = back - place;
-    float ray_length = length(ray);
-    float delta = 1.0 / float(STEPS);
-    vec3 step_vector = normalize(ray) * delta;
-    float step_length = length(step_vector);
-    vec3 at = place;
-    vec4 color = vec4(0.0);
-    float alpha = 0.0;
-    float walked = 0.0;
-    for (int i = 0; i < MAX_STEPS; i++) {
-        vec4 found = in_volume(at);
-        float opacity = found.a * factor;
+  vec3 ray = back - place;
+  float ray_length = length(ray);
+  float delta = 1.0 / float(STEPS);
+  vec3 step_vector = normalize(ray) * delta;
+  float step_length = length(step_vector);
+  vec3 at = place;
+  vec4 color = vec4(0.0);
+  float alpha = 0.0;
+  float walked = 0.0;
+  for (int i = 0; i < MAX_STEPS; i++) {
+    vec4 found = in_volume(at);
+    float opacity = found.a * factor;
 #ifdef PER_STEP
-        opacity *= delta;
+    opacity *= delta;
 #endif
-        color += (1.0 - alpha) * opacity * found;
+    color += (1.0 - alpha) * opacity * found;
 #ifdef ADDED_ALPHA
-        alpha += opacity;
+    alpha += opacity;
 #else
-        alpha += (1.0 - alpha) * opacity;
+    alpha += (1.0 - alpha) * opacity;
 #endif
-        at += step_vector;
-        walked += step_length;
-        if (walked >= ray_length || alpha >= 1.0) {
-            break;
-        }
+    at += step_vector;
+    walked += step_length;
+    if (walked >= ray_length || alpha >= 1.0) {
+      break;
     }
-    gl_FragColor = color;
+  }
+  gl_FragColor = color;
 }

@@ -6,7 +6,7 @@ varying vec3 place;
 varying vec4 clip;
 
 void main() {
-    place = corner;
-    clip = clip_from_texture * vec4(corner, 1.0);
-    gl_Position = clip;
+  place = corner;
+  clip = clip_from_texture * vec4(corner, 1.0);
+  gl_Position = clip;
 }

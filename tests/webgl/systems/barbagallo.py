@@ -1,14 +1,17 @@
-"""Seed 002 in real WebGL 1: the page of today and the article, told apart by `#define`s."""
+"""Seed 002 in WebGL 1: exits as floats, then the front faces and a loop; page and article by `#define`s."""
 
 import numpy as np
 
 from tests.webgl.engine import Engine, Job, Pass, Target, Texture
 from tests.webgl.systems.common import (
-    TARGETS,
+    BLENDS,
+    IMAGE,
+    System,
     box_geometry,
     clip_from_texture,
     drawn,
     program,
+    target_of,
 )
 from volref import Scene
 from volref.emulation.box import box_of
@@ -20,39 +23,35 @@ EMPTY = (0.0, 0.0, 0.0, 0.0)
 
 
 def draw(
-    browser: Engine, scene: Scene, pipeline: Pipeline, *, jitter: np.ndarray | None = None, frames: int = 1
+    engine: Engine, scene: Scene, pipeline: Pipeline, *, jitter: None = None, frames: int = 1
 ) -> dict[str, np.ndarray]:
-    """Every target by name; the entries, which have no target of their own, as a picture of the varying."""
+    """Coordinate targets and canvas; entries have no target of their own, they are the varying drawn."""
     assert jitter is None
     assert frames == 1
     uploads = uploads_of(scene, pipeline)
     box, matrix = box_geometry(scene), {"clip_from_texture": clip_from_texture(scene)}
-    first = program("barbagallo.vertex", "barbagallo_first.fragment")
-    second = program("barbagallo.vertex", "barbagallo.fragment", defines_of(pipeline, uploads))
-    reads = {"exits": "back_coordinates", "atlas": "atlas", "colors": "colors"}
-    factor = {"factor": factor_of(scene, pipeline, box_of(scene))}
+    coordinates = program("coordinates.vertex", "coordinates.fragment")
+    walk = program("barbagallo.vertex", "barbagallo.fragment", defines_of(pipeline, uploads))
+    uniforms = {
+        **matrix,
+        "exits": "back_coordinates",
+        "atlas": "atlas",
+        "colors": "colors",
+        "factor": factor_of(scene, pipeline, box_of(scene)),
+    }
+    blend = BLENDS[pipeline.output.blend]
     passes = (
-        Pass(first, box, matrix, "front_coordinates", EMPTY, depth_test="lequal", cull="back"),
-        Pass(first, box, matrix, "back_coordinates", EMPTY, depth_test="lequal", cull="front"),
-        Pass(
-            second,
-            box,
-            {**matrix, **reads, **factor},
-            "final",
-            scene.background,
-            depth_test="lequal",
-            cull="back",
-        ),
+        Pass(coordinates, box, matrix, "front_coordinates", EMPTY, cull="back"),
+        Pass(coordinates, box, matrix, "back_coordinates", EMPTY, cull="front"),
+        Pass(walk, box, uniforms, IMAGE, scene.background, cull="back", blend=blend),
     )
     targets = {
-        "front_coordinates": Target("rgba32f", depth=True),
-        "back_coordinates": Target("rgba32f", depth=True, filter=pipeline.rays.filter),
-        "final": Target(TARGETS[pipeline.output.format], depth=True),
+        "front_coordinates": Target("rgba32f"),
+        "back_coordinates": target_of(pipeline.rays.format, filtering=pipeline.rays.filter),
+        IMAGE: target_of(pipeline.output.format),
     }
     textures = {"atlas": atlas_of(uploads, pipeline), "colors": canvas_of(uploads, pipeline)}
-    images = drawn(browser, scene, Job(scene.width, scene.height, passes, textures, targets))
-    images["canvas"] = images.pop("final")
-    return images
+    return drawn(engine, Job(scene.width, scene.height, passes, textures, targets))
 
 
 def defines_of(pipeline: Pipeline, uploads: Uploads) -> dict[str, object]:
@@ -85,3 +84,6 @@ def canvas_of(uploads: Uploads, pipeline: Pipeline) -> Texture:
     canvas[-1] = 0
     kind = pipeline.table.filter.replace("linear-mipmap", "linear-mipmap-linear")
     return Texture(canvas, "rgba8", kind, flip_y=True)
+
+
+SYSTEM = System(draw, ("barbagallo", "barbagallo-article"), frozenset({"parallel"}), p99=1e-3)
