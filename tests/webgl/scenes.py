@@ -1,7 +1,8 @@
 """Small scenes on which emulations are held to real WebGL, by name, each with what is special about it.
 
 `needs` are the kinds of scenes that only some systems draw: "mesh" (opaque meshes), "parallel" (rays without
-an eye), "lit" (lights and a material).  A scene without any suits every system.
+an eye), "lit" (lights and a material), "gradients" (a table of the gradient too).  A scene without any suits
+every system.
 """
 
 from collections.abc import Callable
@@ -9,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from volref import Camera, Light, Material, Mesh, Scene, TransferFunction, Volume
+from volref import Camera, Light, Material, Mesh, Scene, TransferFunction, TransferFunction2D, Volume
 from volref.phantoms.meshes import box_mesh, sphere_mesh
 
 WIDTH, HEIGHT = 96, 72
@@ -151,6 +152,33 @@ def lit():
     return scene(volume, towards(volume, (1.0, 0.7, 0.55)), lights=lights, material=material)
 
 
+def lit_by_a_sun():
+    """Light from one side and from everywhere on voxels of three lengths; no highlights."""
+    volume = field((17, 20, 13), spacing=(0.7, 1.1, 1.9), direction=TURNED, origin=(3.0, -2.0, 5.0))
+    lights = (Light.ambient((0.1, 0.15, 0.2)), Light.directional((-1.0, 0.4, -0.6), (1.0, 0.9, 0.8)))
+    material = Material("lambert", ambient=0.1, diffuse=0.9)
+    return scene(volume, towards(volume, (0.8, -0.9, 0.6)), lights=lights, material=material)
+
+
+def lit_from_near():
+    """A light that is weaker with distance, narrow highlights on both sides of surfaces."""
+    volume = field((19, 23, 11), spacing=(1.0, 1.0, 2.0), border=True)
+    near = Light.point((25.0, 30.0, 20.0), (3.0, 2.5, 2.0), attenuation=(1.0, 0.0, 0.004))
+    lights = (near, Light.ambient((0.05, 0.05, 0.1)), Light.directional((0.0, 0.0, -1.0), (0.2, 0.3, 0.4)))
+    material = Material("blinn-phong", ambient=0.1, diffuse=0.5, specular=0.6, shininess=9.0, two_sided=True)
+    camera = towards(volume, (-0.6, 1.0, 0.8))
+    return scene(volume, camera, transfer(0.4, 5.0), lights=lights, material=material)
+
+
+def edges():
+    """Opacity and colour of value and gradient magnitude."""
+    volume = field((20, 22, 18))
+    value, magnitude = np.meshgrid(np.arange(16) / 15, np.arange(8) / 7)
+    colors = [value, magnitude, 1 - value, 0.6 * value * np.sqrt(magnitude)]
+    look = TransferFunction2D(np.stack(colors, axis=-1), (0, 255), (0, 80), 2.0)
+    return scene(volume, towards(volume, (0.7, 0.9, -0.4)), look, lights=(Light.ambient((0.9, 0.8, 0.7)),))
+
+
 MESH = frozenset({"mesh"})
 
 EXAMPLES = {
@@ -168,4 +196,7 @@ EXAMPLES = {
     "mesh behind": Example(mesh_behind, MESH),
     "mesh through": Example(mesh_through, MESH),
     "lit": Example(lit, frozenset({"lit"})),
+    "lit by a sun": Example(lit_by_a_sun, frozenset({"lit"})),
+    "lit from near": Example(lit_from_near, frozenset({"lit"})),
+    "edges": Example(edges, frozenset({"lit", "gradients"})),
 }
