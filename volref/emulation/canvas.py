@@ -103,6 +103,8 @@ def draw(canvas: Floats, pixel: Indices, fragments: Floats, output: Output, devi
     if output.discard_below is not None:
         kept: Booleans = fragments[:, 3] >= output.discard_below
         pixel, fragments = pixel[kept], fragments[kept]
+    if output.precision == "mediump" and device.fragment_color == "float16":
+        fragments = stored(fragments, "half")
     if output.format == "unorm8":
         # Targets of whole numbers clamp colours before they blend them (OpenGL ES 3.0, section 4.1.7).
         fragments = np.clip(fragments, 0.0, 1.0)

@@ -74,8 +74,19 @@ class Device(Switches):
             {"float": "in floating point, rounded once", "integer": "product by product in whole numbers"},
         ),
     ] = "float"
+    planes: Annotated[
+        str,
+        Word(
+            "which corners the planes of a triangle's attributes go through",
+            {"snapped": "those rounded to `subpixel_bits`", "unsnapped": "those of the vertex shader"},
+        ),
+    ] = "snapped"
+    depth_bits: Annotated[int, Whole("bits of a depth buffer, 32 for floats", low=16, high=32)] = 32
     fragment_position: Annotated[
         str, Word("arithmetic of gl_FragCoord in WebGL 1, where it is mediump", ARITHMETIC)
+    ] = "float32"
+    fragment_color: Annotated[
+        str, Word("what gl_FragColor of WebGL 1, which is mediump, takes from a loop", ARITHMETIC)
     ] = "float32"
 
     @property
@@ -131,10 +142,22 @@ PRESETS: dict[str, Device] = {
             result_bits=8,
             subpixel_bits=8,
             srgb="cubic",
+            planes="unsnapped",
+            depth_bits=24,
             blend="integer",
             fragment_position="float16",
+            fragment_color="float16",
         ),
-        Device("lavapipe", weight_bits=8, result_bits=8, subpixel_bits=8, mix="sum", blend="integer"),
+        Device(
+            "lavapipe",
+            weight_bits=8,
+            result_bits=8,
+            subpixel_bits=8,
+            planes="unsnapped",
+            depth_bits=24,
+            mix="sum",
+            blend="integer",
+        ),
         Device("mediump", values="float16", control="float16", fragment_position="float16"),
     )
 }

@@ -50,10 +50,11 @@ def faces(scene: Scene, box: Box, device: Device, cull: str) -> Fragments:
         scene.width,
         scene.height,
         subpixel_bits=device.subpixel_bits,
+        planes=device.planes,
         cull=cull,
         clip_z=scene.camera.clip_z,
     )
-    seen = depth_test(fragments, scene.width * scene.height)
+    seen = depth_test(fragments, scene.width * scene.height, depth_bits=device.depth_bits)
     return Fragments(
         fragments.pixel[seen],
         fragments.triangle[seen],

@@ -538,6 +538,13 @@ class Output(Switches):
     discard_below: Annotated[
         float | None, Real("alpha below which nothing is drawn (None: none)", high=1.0)
     ] = None
+    precision: Annotated[
+        str,
+        Word(
+            "what the shader's output is declared as",
+            {"highp": "highp", "mediump": "mediump, as gl_FragColor of WebGL 1 is: 16 bits on some devices"},
+        ),
+    ] = "highp"
     format: Annotated[str, Word("what the canvas holds", STORED)] = "unorm8"
     mean_format: Annotated[
         str | None, Word("what the running mean of frames holds (None: frames are not averaged)", STORED)

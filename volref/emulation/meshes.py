@@ -44,7 +44,7 @@ def surfaces_of(scene: Scene, device: Device) -> Surfaces:
         none = np.zeros(0)
         return Surfaces(np.zeros(0, np.int64), none, none, np.zeros((3, 0)), np.zeros((0, 3)))
     together = Fragments(*(np.concatenate(parts, axis=-1) for parts in zip(*drawn, strict=True)))
-    seen = depth_test(together, scene.width * scene.height)
+    seen = depth_test(together, scene.width * scene.height, depth_bits=device.depth_bits)
     view, color = np.split(together.varyings[:, seen], 2)
     return Surfaces(together.pixel[seen], together.window_z[seen], together.inverse_w[seen], view, color.T)
 
@@ -101,6 +101,7 @@ def _fragments(mesh: Mesh, scene: Scene, device: Device) -> Fragments:
         scene.width,
         scene.height,
         subpixel_bits=device.subpixel_bits,
+        planes=device.planes,
         cull=CULLED[mesh.sides],
         clip_z=camera.clip_z,
     )

@@ -35,7 +35,7 @@ WORKING = Pipeline(
     opacity=SampleOpacity(source="table", rule="per-step"),
     accumulation=Accumulation(rule="over"),
     meshes=MeshCut(kind="depth", depth="linear", packing="working", comparison="at", composition="over"),
-    output=Output(blend="premultiplied"),
+    output=Output(blend="premultiplied", precision="mediump"),
 )
 
 PRINTED = WORKING.with_switches(

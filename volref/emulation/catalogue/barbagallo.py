@@ -42,7 +42,7 @@ PAGE = Pipeline(
     opacity=SampleOpacity(source="value", rule="per-step", factor=25.6),
     accumulation=Accumulation(rule="over", alpha="weighted"),
     meshes=MeshCut(kind="none"),
-    output=Output(blend="none"),
+    output=Output(blend="none", precision="mediump"),
 )
 
 ARTICLE = PAGE.with_switches(

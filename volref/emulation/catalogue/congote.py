@@ -29,7 +29,7 @@ WORKING = Pipeline(
     opacity=SampleOpacity(source="table", rule="per-step"),
     accumulation=Accumulation(rule="over"),
     meshes=MeshCut(kind="none"),
-    output=Output(blend="premultiplied"),
+    output=Output(blend="premultiplied", precision="mediump"),
 )
 
 PRINTED = WORKING.with_switches(
