@@ -133,7 +133,6 @@ PRESETS: dict[str, Device] = {
             "swiftshader",
             nearest_bits=16,
             subpixel_bits=4,
-            nan_stored="one",
             constant_divisor="multiplied",
         ),
         Device(
