@@ -59,7 +59,8 @@ def jitter_of(system: System, scene: Scene) -> np.ndarray | None:
     if not system.jitter:
         return None
     size = system.frames, scene.height, scene.width
-    return np.random.default_rng(5).random(size, np.float32)
+    drawn = (system.frames, 1, 1) if system.steady else size
+    return np.broadcast_to(np.random.default_rng(5).random(drawn, np.float32), size)
 
 
 def compared(engine: Engine, case: Case) -> dict[str, Figures]:

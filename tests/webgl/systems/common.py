@@ -43,7 +43,7 @@ class System:
     draw: (engine, scene, pipeline, *, jitter=None, frames=1) -> every target by the emulation's own names,
     (H, W, channels), row 0 at the top, uint8 or float32.  pipelines: names in the catalogue.  suits: kinds
     of scenes (see `scenes.py`) that it draws beside plain ones.  p99: what 99 of 100 pixels of a float image are
-    within.  jitter: whether it is given start offsets.  frames: how many it averages in the tests.
+    within.  jitter: whether it is given start offsets; steady: the same all over a frame.  frames: how many it averages in the tests.
     """
 
     draw: Callable[..., dict[str, np.ndarray]]
@@ -51,6 +51,7 @@ class System:
     suits: frozenset[str] = frozenset()
     p99: float = 1e-5
     jitter: bool = False
+    steady: bool = False
     frames: int = 1
 
 

@@ -4,8 +4,17 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from tests.webgl.engine import Engine, Job, Pass, Target
-from tests.webgl.systems.common import TARGETS, drawn, float32, program, table_upload, volume_upload
+from tests.webgl.engine import Engine, Job, Pass
+from tests.webgl.systems.common import (
+    IMAGE,
+    System,
+    drawn,
+    float32,
+    program,
+    table_upload,
+    target_of,
+    volume_upload,
+)
 from volref import Scene
 from volref.emulation.box import box_of
 from volref.emulation.opacity import factor_of
@@ -16,22 +25,20 @@ ALPHA = {"one": "1.0", "accumulated": "sum.a"}
 
 
 def draw(
-    browser: Engine, scene: Scene, pipeline: Pipeline, *, jitter: np.ndarray | None = None, frames: int = 1
+    engine: Engine, scene: Scene, pipeline: Pipeline, *, jitter: np.ndarray | None = None, frames: int = 1
 ) -> dict[str, np.ndarray]:
     """Every target by name; jitter is (frames, H, W), and the same all over each frame."""
     uploads = uploads_of(scene, pipeline)
-    output, plain = pipeline.output, {"read": ("frame", "mean", "final")}
-    targets = {"frame": Target(TARGETS[output.format]), "final": Target(TARGETS[output.format])}
-    targets |= dict.fromkeys(("mean", "other"), Target(TARGETS[output.mean_format]))
+    output = pipeline.output
+    targets = dict.fromkeys(("frame", IMAGE), target_of(output.format))
+    targets |= dict.fromkeys(("running_mean", "other"), target_of(output.mean_format))
     textures = {
         "volume": volume_upload(uploads, pipeline, version=2),
         "colors": table_upload(uploads, pipeline, version=2),
     }
-    offsets = offsets_of(jitter, frames)
-    passes = tuple(_passes(scene, pipeline, offsets))
-    job = Job(scene.width, scene.height, passes, textures, targets, version=2, **plain)
-    images = drawn(browser, job)
-    return {"frame": images["frame"], "running_mean": images["mean"], "canvas": images["final"]}
+    passes = tuple(_passes(scene, pipeline, offsets_of(jitter, frames)))
+    read = ("frame", "running_mean", IMAGE)
+    return drawn(engine, Job(scene.width, scene.height, passes, textures, targets, read, version=2))
 
 
 def offsets_of(jitter: np.ndarray | None, frames: int) -> list[float]:
@@ -52,8 +59,8 @@ def _passes(scene: Scene, pipeline: Pipeline, offsets: list[float]) -> Iterator[
         "step_size": 1 / pipeline.stepping.steps,
         "extinction": factor_of(scene, pipeline, box_of(scene)),
     }
-    # The mean of the last frame is to be in "mean": the two targets take turns.
-    turns = ["mean", "other"] if len(offsets) % 2 == 0 else ["other", "mean"]
+    # Two targets take turns; the mean of all frames is to end up in the first.
+    turns = ["running_mean", "other"] if len(offsets) % 2 == 0 else ["other", "running_mean"]
     yield Pass(program(screen, "vpt_reset.fragment"), target=turns[0])
     for number, offset in enumerate(offsets, start=1):
         before, after = turns[(number - 1) % 2], turns[number % 2]
@@ -61,5 +68,8 @@ def _passes(scene: Scene, pipeline: Pipeline, offsets: list[float]) -> Iterator[
         mixed = {"mean": before, "frame": "frame", "share": 1 / number}
         yield Pass(program(screen, "vpt_integrate.fragment"), uniforms=mixed, target=after)
     names = ("low", "mid", "high", "saturation", "gamma")
-    shaped = {"mean": "mean", **{name: getattr(output, name) for name in names}}
-    yield Pass(program(screen, "vpt_artistic.fragment"), uniforms=shaped, target="final")
+    shaped = {"mean": "running_mean", **{name: getattr(output, name) for name in names}}
+    yield Pass(program(screen, "vpt_artistic.fragment"), uniforms=shaped, target=IMAGE)
+
+
+SYSTEM = System(draw, ("vpt-eam",), frozenset({"parallel"}), p99=1e-4, jitter=True, steady=True, frames=3)

@@ -2,16 +2,18 @@
 
 import numpy as np
 
-from tests.webgl.engine import Engine, Job, Pass, Target
+from tests.webgl.engine import Engine, Job, Pass
 from tests.webgl.systems.common import (
     BLENDS,
-    TARGETS,
+    IMAGE,
+    System,
     box_geometry,
     clip_from_texture,
     drawn,
     eye_in_texture,
     program,
     table_upload,
+    target_of,
     volume_upload,
 )
 from volref import Scene
@@ -22,7 +24,7 @@ from volref.emulation.uploads import Uploads, uploads_of
 
 
 def draw(
-    browser: Engine, scene: Scene, pipeline: Pipeline, *, jitter: np.ndarray | None = None, frames: int = 1
+    engine: Engine, scene: Scene, pipeline: Pipeline, *, jitter: np.ndarray | None = None, frames: int = 1
 ) -> dict[str, np.ndarray]:
     """Draw the canvas, the only target; with the eye in the box the back faces are drawn."""
     assert jitter is None
@@ -42,15 +44,14 @@ def draw(
         program("x3dom.vertex", "x3dom.fragment", defines_of(pipeline, uploads)),
         box_geometry(scene),
         uniforms,
-        "final",
+        IMAGE,
         scene.background,
         cull="front" if np.all((eye > 0) & (eye < 1)) else "back",
         blend=BLENDS[pipeline.output.blend],
     )
-    targets = {"final": Target(TARGETS[pipeline.output.format])}
+    targets = {IMAGE: target_of(pipeline.output.format)}
     textures = {"atlas": volume_upload(uploads, pipeline), "colors": table_upload(uploads, pipeline)}
-    images = drawn(browser, Job(scene.width, scene.height, (drawing,), textures, targets))
-    return {"canvas": images["final"]}
+    return drawn(engine, Job(scene.width, scene.height, (drawing,), textures, targets))
 
 
 def defines_of(pipeline: Pipeline, uploads: Uploads) -> dict[str, object]:
@@ -62,3 +63,6 @@ def defines_of(pipeline: Pipeline, uploads: Uploads) -> dict[str, object]:
         "SLICES": float(uploads.size[2]),
     }
     return {**numbers, "ROW_DIVISOR": "DOWN" if pipeline.volume.tile_row == "rows" else "ACROSS"}
+
+
+SYSTEM = System(draw, ("x3dom",), p99=1e-3)
