@@ -1,4 +1,4 @@
-"""Seed 003 and its base for one pixel, in plain Python: the paper's equations, one ray and one sample at a time.
+"""Seed 003 and its base for one pixel, in plain Python: the paper's equations, one sample at a time.
 
 Numbers on which the count of samples hangs are numpy.float32, in the order of the shader; colours are Python
 floats.  It shares no code with volref: its own basis, slab test, fetches and sums.
@@ -73,7 +73,7 @@ def fetched(codes, at):
 
 
 def entry(table, value, *, centered=False):
-    """Straight RGBA of a value in a table of n rows, as a linear texture: looked up at v, or on the entries."""
+    """Straight RGBA of a value in a linear texture of n rows: looked up at v, or from first to last row."""
     n = len(table)
     at = (value * (n - 1) + 0.5) / n if centered else value
     place = min(max(at * n - 0.5, 0.0), n - 1.0)
@@ -82,7 +82,7 @@ def entry(table, value, *, centered=False):
 
 
 def over(samples, opaque_at=0.95):
-    """Seed 003: premultiplied colour, alpha, and how many samples were taken, until alpha is above `opaque_at`."""
+    """Seed 003: premultiplied colour, alpha, and the count of samples, until alpha is above `opaque_at`."""
     color, alpha, count = [0.0, 0.0, 0.0], 0.0, 0
     for *rgb, a in samples:
         color = [c + (1 - alpha) * a * x for c, x in zip(color, rgb, strict=True)]

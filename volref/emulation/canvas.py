@@ -50,7 +50,7 @@ def over_environment(
 
 
 def tone_mapped(rgba: Floats, output: Output, background: RGBA) -> Floats:
-    """Return colours (..., 4) squeezed, put over the background if the shader does that, and raised to 1 / gamma.
+    """Return colours (..., 4) squeezed, put over the background by shaders that do, raised to 1 / gamma.
 
     The background is taken for a code value, of which the light is b^gamma: where nothing is in front of it,
     it comes out as it was.

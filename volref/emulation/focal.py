@@ -2,8 +2,8 @@
 
     p = o + t v     v = R (x_ndc aspect, y_ndc, -f)     f = 1 / tan(fov / 2)
 
-o and R, the eye and the turn from view to texture space, are uniforms of the shader; v keeps whatever length it
-has.  All is computed in the control type, operation by operation as a shader does.  R rays.
+o and R, the eye and the turn from view to texture space, are uniforms of the shader; v is not normalised.
+All is computed in the control type, operation by operation as a shader does.  R rays.
 """
 
 import numpy as np
@@ -31,9 +31,9 @@ def focal_ends(scene: Scene, rule: str, box: Box, device: Device, surface: Float
     camera, kind = scene.camera, device.control_type
     if camera.is_parallel:
         message = (
-            f"camera must be a perspective one for pipeline.rays.direction {rule!r}, got a parallel one; "
+            f"camera must be a perspective one for pipeline.rays.direction {rule!r}, got a parallel "
         )
-        raise SceneError(message + "use a pipeline with 'eye'")
+        raise SceneError(message + "one; use a pipeline with 'eye'")
     eye = transform_points(box.texture_from_world, camera.world_from_view[:3, 3]).astype(kind)
     turn = (box.texture_from_world @ camera.world_from_view)[:3, :3].astype(kind)
     view = _view_directions(scene, rule, device)
@@ -59,7 +59,7 @@ def _view_directions(scene: Scene, rule: str, device: Device) -> Floats:
 
 
 def _slab(eye: Floats, along: Floats) -> tuple[Floats, Floats]:
-    """Return the t (R,) at which rays along (3, R) from the eye (3,) enter and leave the unit cube, at t >= 0."""
+    """Return the t (R,) >= 0 at which rays along (3, R) from the eye (3,) enter and leave the unit cube."""
     kind = along.dtype.type
     with np.errstate(divide="ignore", invalid="ignore"):
         inverse = kind(1) / along

@@ -87,7 +87,7 @@ Observer: TypeAlias = Callable[[Sample], None]
 
 @dataclass(eq=False)
 class _Walk:
-    """What changes from iteration to iteration, of rays `ray` (n,); `walked` is what is left for "length-left"."""
+    """What changes from iteration to iteration, of rays `ray` (n,); walked counts down for "length-left"."""
 
     ray: Indices
     paths: Paths

@@ -1,8 +1,8 @@
-"""Seed 003: Burkalo, "Visualization of volumetric data", 2022, and its base, m-pilia/volume-raycasting, 2018.
+"""Seed 003: Burkalo, "Visualization of volumetric data", 2022, and its base: m-pilia/volume-raycasting.
 
-One pass: a slab test along (x, y, -f), steps of one length in texture space from where the ray enters, a cubic
-spline as a table, *over* until alpha is above 0.95, then a tone map and gamma.  There is no code of it in
-public.  `burkalo2022-printed` is the text to the letter: no aspect, the colour written as it is after gamma.
+One pass: a slab test along (x, y, -f), steps of one length in texture space from where the ray enters, a
+cubic spline as a table, *over* until alpha is above 0.95, then a tone map and gamma.  There is no public code
+of it.  `burkalo2022-printed` is the text to the letter: no aspect, the colour written as it is after gamma.
 `burkalo2022` has the aspect, and meets the background as its base does.  `mpilia2018` is that base, whose sum
 puts the deepest sample in front.
 """
