@@ -13,6 +13,8 @@ from volref import Scene
 from volref.emulation.ambiguity import ambiguous
 from volref.emulation.catalogue import named
 from volref.emulation.device import Device
+from volref.emulation.meshes import NOWHERE
+from volref.emulation.packing import unpacked
 from volref.emulation.passes import emulate
 from volref.emulation.pipeline import Pipeline
 
@@ -67,15 +69,23 @@ def compared(engine: Engine, case: Case) -> dict[str, Figures]:
     """Figures of every target."""
     scene, pipeline, device = EXAMPLES[case.scene].make(), case.described(), Device.named(engine.name)
     jitter, frames = jitter_of(case.system, scene), case.system.frames
-    ours = emulate(scene, pipeline, device, jitter, frames).passes
+    ours = dict(emulate(scene, pipeline, device, jitter, frames).passes)
     theirs = case.system.draw(engine, scene, pipeline, jitter=jitter, frames=frames)
     assert set(theirs) == set(ours), f"emulated {sorted(ours)}, drawn {sorted(theirs)}"
 
     def predicted() -> np.ndarray:
         return ambiguous(scene, pipeline, device, jitter, frames)
 
-    on_canvas = {"canvas", "frame", "running_mean"}
-    cleared = {
-        name: scene.background if name in on_canvas else np.zeros(ours[name].shape[-1]) for name in ours
-    }
-    return {name: figures(ours[name], theirs[name], predicted, cleared[name]) for name in ours}
+    cleared = dict.fromkeys(("canvas", "frame", "running_mean"), scene.background)
+    cleared["mesh_distance"] = (NOWHERE,)
+    nothing = (0.0,)
+    for images in (ours, theirs):
+        images |= {name: as_numbers(images[name], pipeline) for name in ours if name.endswith("_depth")}
+    return {name: figures(ours[name], theirs[name], predicted, cleared.get(name, nothing)) for name in ours}
+
+
+def as_numbers(target: np.ndarray, pipeline: Pipeline) -> np.ndarray:
+    """Depths (H, W, 1) that a target holds: of their last digits no two roundings agree."""
+    floats = target * np.float32(1 / 255) if target.dtype == np.uint8 else target.astype(np.float32)
+    height, width, channels = floats.shape
+    return unpacked(floats.reshape(-1, channels), pipeline.meshes.packing).reshape(height, width, 1)

@@ -4,7 +4,7 @@ Only pixels that one of the two has drawn count: where both hold what the target
 equal without merit.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -56,12 +56,12 @@ class Figures:
 
 
 def figures(
-    ours: np.ndarray, theirs: np.ndarray, predicted: Callable[[], np.ndarray], cleared: np.ndarray
+    ours: np.ndarray, theirs: np.ndarray, predicted: Callable[[], np.ndarray], cleared: Sequence[float]
 ) -> Figures:
     """Figures of one target: emulated floats (..., C), and bytes or floats (..., C) of real WebGL.
 
     predicted: which pixels (H, W) hang on a comparison, asked only if one is off by more than 1/255.
-    cleared: the colour (C,) before anything was drawn.
+    cleared: the colour (C,) or (1,) before anything was drawn.
     """
     assert ours.shape == theirs.shape, f"emulated {ours.shape}, drawn {theirs.shape}"
     whole = theirs.dtype == np.uint8

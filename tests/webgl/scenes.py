@@ -15,6 +15,8 @@ from volref.phantoms.meshes import box_mesh, sphere_mesh
 
 WIDTH, HEIGHT = 96, 72
 
+# Colours of meshes and backgrounds are fifths: whole bytes, so that no rounding decides on what is all one.
+
 # A turn about an oblique axis: orthogonal to rounding.
 TURNED = np.linalg.qr(np.array([[2.0, -1.0, 0.5], [1.0, 2.0, 0.3], [-0.4, 0.2, 2.0]]))[0]
 
@@ -66,7 +68,7 @@ def oblique():
 def axis_aligned():
     """Straight along z, over a background: rays through the middle are parallel to two axes, almost."""
     volume = field()
-    camera = towards(volume, (0.0, 0.0, 1.0), up=(0.0, 1.0, 0.0))
+    camera = towards(volume, (0.0, 0.0, 1.0), distance=1.57, up=(0.0, 1.0, 0.0))
     return scene(volume, camera, background=(0.2, 0.2, 0.4, 0.6))
 
 
@@ -125,12 +127,12 @@ def _with(mesh: Callable[[np.ndarray, np.ndarray], Mesh]) -> Scene:
 
 def mesh_in_front():
     """A ball between the eye and the box."""
-    return _with(lambda middle, way: sphere_mesh(3.0, middle + 22 * way, (0.2, 0.8, 0.3), subdivisions=1))
+    return _with(lambda middle, way: sphere_mesh(3.0, middle + 22 * way, (0.2, 0.8, 0.4), subdivisions=1))
 
 
 def mesh_inside():
     """A box within the volume."""
-    return _with(lambda middle, _: box_mesh((7.0, 6.0, 5.0), middle, (0.9, 0.9, 0.2)))
+    return _with(lambda middle, _: box_mesh((7.0, 6.0, 5.0), middle, (1.0, 0.8, 0.2)))
 
 
 def mesh_behind():
@@ -141,7 +143,8 @@ def mesh_behind():
 def mesh_through():
     """A bent sheet that cuts the box and stands out from it."""
     corners = np.array([(-20.0, -14.0, -5.0), (18.0, -16.0, 3.0), (20.0, 15.0, 6.0), (-19.0, 16.0, -3.0)])
-    return _with(lambda middle, _: Mesh(corners + middle, [(0, 1, 2), (0, 2, 3)], (0.3, 0.6, 0.9)))
+    colors = [(0.2, 0.6, 1.0), (0.0, 1.0, 0.4), (1.0, 0.6, 0.0), (0.8, 0.8, 0.8)]
+    return _with(lambda middle, _: Mesh(corners + middle, [(0, 1, 2), (0, 2, 3)], colors))
 
 
 def lit():

@@ -1,4 +1,4 @@
-"""Divisions by numbers that the compiler knows, held to the device presets: they decide where slices change."""
+"""Divisions by numbers that the compiler knows, held to device presets: they decide where slices change."""
 
 import numpy as np
 

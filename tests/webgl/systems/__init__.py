@@ -1,5 +1,14 @@
 """The systems of the catalogue in GLSL, written from their papers: a second implementation of each."""
 
-from tests.webgl.systems import barbagallo, burkalo, cej, congote, vpt, x3dom
+from tests.webgl.systems import arbelaz, barbagallo, burkalo, cej, congote, texture3d, vpt, x3dom
 
-SYSTEMS = (barbagallo.SYSTEM, congote.SYSTEM, burkalo.SYSTEM, cej.SYSTEM, vpt.SYSTEM, x3dom.SYSTEM)
+SYSTEMS = (
+    texture3d.SYSTEM,
+    arbelaz.SYSTEM,
+    barbagallo.SYSTEM,
+    congote.SYSTEM,
+    burkalo.SYSTEM,
+    cej.SYSTEM,
+    vpt.SYSTEM,
+    x3dom.SYSTEM,
+)
