@@ -33,7 +33,7 @@ CULLED = {"both": "none", "front": "back", "back": "front"}
 def draw(
     engine: Engine, scene: Scene, pipeline: Pipeline, *, jitter: None = None, frames: int = 1
 ) -> dict[str, np.ndarray]:
-    """Depth and colour of the meshes, depth and coordinates of the box's back, the front's, and the canvas."""
+    """Depth and colour of the meshes, depth and coordinates of the back, coordinates of the front, canvas."""
     assert jitter is None
     assert frames == 1
     uploads = uploads_of(scene, pipeline)
