@@ -226,6 +226,13 @@ class VolumeTexture(Switches):
             },
         ),
     ] = "columns"
+    tile_column: Annotated[
+        str,
+        Word(
+            "how the column of a slice's tile is found",
+            {"fract": "fract(s / M)", "mod": "mod(s, M) / M: rounded once only"},
+        ),
+    ] = "fract"
     second_column: Annotated[
         str,
         Word(

@@ -59,7 +59,7 @@ def slice_pair(
         y = kind(1) - y
     across, down = kind(tiles[0]), kind(tiles[1])
     x, y = x / across, y / down
-    columns = _fract(first / across), _fract(second / across)
+    columns = _column(switches, first, across), _column(switches, second, across)
     if switches.second_column == "printed":
         columns = columns[0], np.floor(second / across)
     rows = (_row(switches, s, across, down) for s in (first, second))
@@ -77,6 +77,13 @@ def _in_tile(switches: VolumeTexture, place: Floats, texels: int) -> Floats:
         whole = kind(texels + 2 * switches.padding)
         place = (place * kind(texels) + kind(switches.padding)) / whole
     return place
+
+
+def _column(switches: VolumeTexture, number: Floats, across: np.floating[Any]) -> Floats:
+    """Return the u at which the column of a slice's tile begins."""
+    if switches.tile_column == "fract":
+        return _fract(number / across)
+    return np.asarray((number - across * np.floor(number / across)) / across)
 
 
 def _row(switches: VolumeTexture, number: Floats, across: np.floating[Any], down: np.floating[Any]) -> Floats:

@@ -35,6 +35,7 @@ PAGE = Pipeline(
         channel="alpha",
         first_tile="v1",
         rows="with-v",
+        tile_column="mod",
         slices="last",
         second_slice="clamped",
     ),
