@@ -41,13 +41,15 @@ def ambiguous(
     """Return which pixels (H, W) of an emulation hang on a comparison; arguments as for `emulate`.
 
     A coordinate that is stored in 8 bits counts: where it is near the middle between two bytes, the ray is
-    another one.
+    another one.  So does a mean of frames in 8 bits: next to black a tone map makes many steps of one.
     """
     base = _floating(pipeline)
-    plain = emulate(scene, base, device, jitter, frames).rgba
     found = _without_direction(scene, base, device or Device())
-    for moved, changed in _nudged(scene, base):
-        found |= _differ(plain, emulate(moved, changed, device, jitter, frames).rgba)
+    in_bytes = pipeline.output.mean_format == pipeline.output.format == "unorm8"
+    for program, visible in ((base, VISIBLE), (pipeline, 1.5 / 255))[: 1 + in_bytes]:
+        plain = emulate(scene, program, device, jitter, frames).rgba
+        for moved, changed in _nudged(scene, program):
+            found |= _differ(plain, emulate(moved, changed, device, jitter, frames).rgba, visible)
     return found
 
 
@@ -85,6 +87,6 @@ def _moved(camera: Camera, by: Floats) -> Camera:
     return dataclasses.replace(camera, view_from_world=affine(np.eye(3), -by) @ camera.view_from_world)
 
 
-def _differ(one: Floats, other: Floats) -> Booleans:
-    apart = np.abs(one - other) > VISIBLE
+def _differ(one: Floats, other: Floats, visible: float) -> Booleans:
+    apart = np.abs(one - other) > visible
     return np.asarray((apart | (np.isnan(one) != np.isnan(other))).any(axis=-1))
