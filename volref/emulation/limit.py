@@ -14,6 +14,7 @@ The last three have one extinction for all rays only where that length is the sa
 
 import numpy as np
 
+from volref.arrays import Floats
 from volref.emulation.box import Box, box_of
 from volref.emulation.device import Device
 from volref.emulation.opacity import factor_of
@@ -43,7 +44,7 @@ def limit_scene(scene: Scene, pipeline: Pipeline) -> Scene:
     SceneError
         If the program tends to nothing that is an integral, or its extinction differs from ray to ray.
     """
-    _refuse_printed(pipeline)
+    _refuse_printed(scene, pipeline)
     box, uploads = box_of(scene), uploads_of(scene, pipeline)
     return Scene(
         _volume(scene, pipeline, uploads, box),
@@ -58,22 +59,30 @@ def limit_scene(scene: Scene, pipeline: Pipeline) -> Scene:
 
 
 def widened(pipeline: Pipeline) -> Pipeline:
-    """Return a program whose textures and targets lose nothing, and that shows its colours as they are."""
+    """Return a program whose textures and targets lose nothing, and that shows its colours as they are.
+
+    Their sum lies over the background, premultiplied, without tone map and gamma.
+    """
     exact = {"format": "exact"}
-    output: dict[str, Plain] = {**exact, "tone_map": "none", "gamma": 1.0}
+    output: dict[str, Plain] = {**exact, "tone_map": "none", "gamma": 1.0, "precision": "highp"}
+    output |= {"blend": "premultiplied", "missed": "clear", "discard_below": None}
     if pipeline.output.mean_format is not None:
         output["mean_format"] = "exact"
-    return pipeline.with_switches(rays=exact, volume=exact, table=exact, output=output)
+    return pipeline.with_switches(
+        rays=exact, volume=exact, table=exact, accumulation={"alpha": "accumulated"}, output=output
+    )
 
 
 def refined(scene: Scene, pipeline: Pipeline, times: int) -> Pipeline:
     """Return a program whose step is `times` finer.
 
     An opacity that is not corrected for the step becomes one that is, for the step that it is taken to mean;
-    no alpha ends a ray, and no cap.
+    no alpha ends a ray.
     """
     stepping = pipeline.stepping
-    changes: dict[str, Plain] = {"opaque_at": None, "cap": None, "steps": stepping.steps * times}
+    changes: dict[str, Plain] = {"opaque_at": None, "steps": stepping.steps * times}
+    if stepping.cap is not None:
+        changes["cap"] = stepping.cap * times
     if stepping.rule in ("world-length", "texture-length"):
         world = stepping.rule == "world-length"
         length = world_step_of(stepping, scene) if world else stepping.length or 1.0 / stepping.steps
@@ -81,11 +90,13 @@ def refined(scene: Scene, pipeline: Pipeline, times: int) -> Pipeline:
     opacity: dict[str, Plain] = {"factor": factor_of(scene, pipeline, box_of(scene))}
     if pipeline.opacity.rule == "as-is":
         assert scene.transfer is not None
-        opacity = {"rule": "corrected", "factor": scene.transfer.unit_distance / _lengths(scene, pipeline)[0]}
+        exact = pipeline.with_switches(rays={"format": "exact"})
+        step = _one(prepare(scene, exact, EXACT).paths.world_step, pipeline)
+        opacity = {"rule": "corrected", "factor": scene.transfer.unit_distance / step}
     return pipeline.with_switches(stepping=changes, opacity=opacity)
 
 
-def _refuse_printed(pipeline: Pipeline) -> None:
+def _refuse_printed(scene: Scene, pipeline: Pipeline) -> None:
     """Refuse programs whose image is not that of an emission-absorption integral at any step."""
     volume, table = pipeline.volume, pipeline.table
     reasons = {
@@ -96,9 +107,9 @@ def _refuse_printed(pipeline: Pipeline) -> None:
         "slices are mixed by x": volume.between == "x",
         "slices are not interpolated": volume.between == "none" or volume.filter == "nearest",
         "the table is not interpolated": table.filter == "nearest",
-        "opacity is the value itself": pipeline.opacity.source == "value",
         "opacity is weighted by the gradient": pipeline.opacity.by_gradient > 0,
         "colours are lit": pipeline.lighting.model != "none",
+        "surfaces are added as printed": bool(scene.meshes) and pipeline.meshes.composition == "printed",
     }
     for reason, holds in reasons.items():
         if holds:
@@ -134,30 +145,31 @@ def _transfer(scene: Scene, pipeline: Pipeline, uploads: Uploads, box: Box) -> T
     direct = pipeline.table.coordinate == "direct"
     place = low + (high - low) * ((index + 0.5) / count if direct else index / (count - 1))
     colors, opacity = entries[:, :3] * pipeline.lighting.factor, entries[:, 3]
+    if pipeline.opacity.source == "value":
+        place, colors = np.r_[low, place, high], np.pad(colors, ((1, 1), (0, 0)), mode="edge")
+        opacity = (place - low) / (high - low)
     rule, factor = pipeline.opacity.rule, factor_of(scene, pipeline, box)
     if rule == "corrected":
         return TransferFunction.from_opacity(place, colors, opacity, scene.transfer.unit_distance / factor)
-    step, unit = _lengths(scene, pipeline)
-    if rule == "as-is":
-        return TransferFunction.from_opacity(place, colors, opacity * factor, step)
-    length = step * pipeline.stepping.steps if rule == "per-step" else unit
-    return TransferFunction(place, colors, opacity * factor / length)
-
-
-def _lengths(scene: Scene, pipeline: Pipeline) -> tuple[float, float]:
-    """Return the world lengths of a step and of a unit of texture space, which must be those of all rays."""
     exact = pipeline.with_switches(rays={"format": "exact"})
     paths = prepare(scene, exact, EXACT).paths
-    lengths = paths.world_step, paths.world_step / paths.texture_step
-    for length in lengths:
-        # 1e-9: the ends of rays are off by some units in the last place of float64.
-        if len(length) and np.ptp(length) > 1e-9 * length.mean():
-            message = (
-                f"pipeline {pipeline.name!r} must have one extinction for all rays to have a limit, got "
-            )
-            message += (
-                f"steps {length.min():g} to {length.max():g} long; look along an axis with parallel rays"
-            )
-            raise SceneError(message)
-    step, unit = (float(length.mean()) for length in lengths)
-    return step, unit
+    if rule == "as-is":
+        return TransferFunction.from_opacity(
+            place, colors, opacity * factor, _one(paths.world_step, pipeline)
+        )
+    lengths = paths.world_step * pipeline.stepping.steps
+    if rule == "per-length":
+        lengths = paths.world_step / paths.texture_step
+    return TransferFunction(place, colors, opacity * factor / _one(lengths, pipeline))
+
+
+def _one(lengths: Floats, pipeline: Pipeline) -> float:
+    """Return the world length (R,) that decides on the extinction, which must be that of all rays."""
+    # 1e-9: the ends of rays are off by some units in the last place of float64.
+    if len(lengths) and np.ptp(lengths) > 1e-9 * lengths.mean():
+        message = f"pipeline {pipeline.name!r} must have one extinction for all rays to have a limit, got "
+        message += (
+            f"lengths from {lengths.min():g} to {lengths.max():g}; look along an axis with parallel rays"
+        )
+        raise SceneError(message)
+    return float(lengths.mean())
