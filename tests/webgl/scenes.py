@@ -47,7 +47,10 @@ def transfer(opacity=0.5, unit_distance=4.0):
 
 
 def towards(volume, direction, *, distance=1.6, fov_y=35.0, up=(0.1, 0.2, 1.0), off=0.0):
-    """Camera that looks from a direction at the middle of a volume, from some of its diagonals away."""
+    """Camera that looks from a direction at the middle of a volume, from some of its diagonals away.
+
+    off: how far beside the middle, in diagonals.  Straight from the middle, coordinates are simple fractions.
+    """
     low, high = volume.corners.min(axis=0), volume.corners.max(axis=0)
     diagonal = float(np.linalg.norm(high - low))
     target = (low + high) / 2 + off * diagonal
@@ -68,7 +71,7 @@ def oblique():
 def axis_aligned():
     """Straight along z, over a background: rays through the middle are parallel to two axes, almost."""
     volume = field()
-    camera = towards(volume, (0.0, 0.0, 1.0), distance=1.57, up=(0.0, 1.0, 0.0))
+    camera = towards(volume, (0.0, 0.0, 1.0), up=(0.0, 1.0, 0.0), off=0.013)
     return scene(volume, camera, background=(0.2, 0.2, 0.4, 0.6))
 
 
