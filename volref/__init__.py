@@ -77,7 +77,8 @@ if TYPE_CHECKING:
     from volref.truth.result import Render
     from volref.truth.series import render_series
     from volref.truth.supersampling import supersample
-    from volref.truth.tracing import Trace, trace
+    from volref.traces import Trace
+    from volref.truth.tracing import trace
     from volref.truth.verification import Verification, verify
 
 __version__ = "0.1.0"
@@ -191,7 +192,8 @@ _HOMES = {
     "volref.truth.series": ("render_series",),
     "volref.truth.supersampling": ("supersample",),
     "volref.truth.result": ("Render",),
-    "volref.truth.tracing": ("Trace", "trace"),
+    "volref.traces": ("Trace",),
+    "volref.truth.tracing": ("trace",),
     "volref.truth.verification": ("Verification", "verify"),
 }
 _HOME = dict.fromkeys(__all__, "volref.io") | {name: home for home, names in _HOMES.items() for name in names}

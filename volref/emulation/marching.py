@@ -101,15 +101,16 @@ class _Walk:
     over: Booleans
 
 
-def march(program: Program, observe: Observer | None = None) -> Marched:
-    """Return what the loop accumulates along all rays."""
+def march(program: Program, observe: Observer | None = None, rays: Indices | None = None) -> Marched:
+    """Return what the loop accumulates along all rays, or along some: that of the others stays 0."""
+    chosen = np.arange(len(program.offset)) if rays is None else rays
     count, kind = len(program.offset), program.textures.device.values_type
     color, alpha, weighted = np.zeros((3, count), kind), np.zeros(count, kind), np.zeros(count, kind)
     result = Marched(color, alpha, weighted, np.zeros(count, np.int64), np.zeros(count, np.bool_))
     work = Workspace()
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        for first in range(0, count, CHUNK):
-            _run(program, np.arange(first, min(first + CHUNK, count)), result, work, observe)
+        for first in range(0, len(chosen), CHUNK):
+            _run(program, chosen[first : first + CHUNK], result, work, observe)
     return result
 
 

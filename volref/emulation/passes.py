@@ -90,12 +90,8 @@ def emulate(
     mean = cleared(scene, program.output, machine)
     for number, offset in enumerate(offsets, start=1):
         marched = march(drawing.program(offset))
-        canvas = drawn(drawing, marched)
-        if program.output.mean_format is not None:
-            mean = mean_of_frames(mean, canvas, number, program.output, machine)
-            passes |= {"frame": canvas, "running_mean": mean}
-            canvas = store(tone_mapped(mean, program.output, scene.background), program.output.format, machine)
-    passes["canvas"] = canvas
+        last, mean = last_targets(drawing, marched, number, mean)
+    passes |= last
     size = scene.height, scene.width
     samples = np.zeros(size, np.int64)
     samples.reshape(-1)[drawing.ends.pixel] = marched.samples
@@ -162,6 +158,19 @@ def prepare(scene: Scene, pipeline: Pipeline, device: Device) -> Drawing:
     shade = shader_of(scene, textures, box, ends)
     ready = textures, ends, paths, rule, targets, surfaces, distance, cut, shade
     return Drawing(scene, pipeline, device, box, uploads, *ready)
+
+
+def last_targets(
+    drawing: Drawing, marched: Marched, number: int, mean: Floats
+) -> tuple[dict[str, Floats], Floats]:
+    """Return the targets that end with the canvas after frame `number`, from 1, and the running mean."""
+    output, device = drawing.pipeline.output, drawing.device
+    frame = drawn(drawing, marched)
+    if output.mean_format is None:
+        return {"canvas": frame}, mean
+    mean = mean_of_frames(mean, frame, number, output, device)
+    canvas = store(tone_mapped(mean, output, drawing.scene.background), output.format, device)
+    return {"frame": frame, "running_mean": mean, "canvas": canvas}, mean
 
 
 def drawn(drawing: Drawing, marched: Marched) -> Floats:

@@ -12,7 +12,8 @@ What is beyond an edge is the edge's texel ("clamp") or the texture again ("repe
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from itertools import product
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -116,6 +117,48 @@ def fetch_slices(
     """Return the first channel (n,) at (u1, v1) and at (u2, v2), as from two slices of an atlas."""
     # One after the other: buffers for both at once would not stay in the cache.
     return fetch(texture, (u1, v1), work)[0], fetch(texture, (u2, v2), work)[0]
+
+
+class Footprint(NamedTuple):
+    """The texels of fetches: indices (n, k, axes), weights (n, k), numbers (n, k, C); x fastest."""
+
+    texel: Numbers
+    weight: Floats
+    value: Floats
+
+
+def footprint(texture: Texture, coordinates: Sequence[Floats] | Floats) -> Footprint:
+    """Return the texels that a fetch at coordinates mixes, k = 1 or 2 along each axis, and with what weights.
+
+    Examples
+    --------
+    >>> ramp = Texture(np.array([[[0.0], [1.0]]]))
+    >>> found = footprint(ramp, np.array([[0.375], [0.5]]))
+    >>> found.texel.tolist(), found.weight.tolist(), found.value.tolist()
+    ([[[0, 0], [1, 0]]], [[0.75, 0.25]], [[[0.0], [1.0]]])
+    """
+    index, weights = _cells(texture, coordinates, Workspace())
+    shares = iter([w / 2.0 ** (texture.weight_bits or 0) if w.dtype.kind == "i" else w for w in weights])
+    axes = []
+    for size, stride in zip(texture.sizes, texture.strides, strict=True):
+        lowest = index // stride % (size + 2 * PAD) - PAD if stride else np.zeros_like(index)
+        share = next(shares) if stride and texture.filter == "linear" else None
+        axes.append(_neighbors(lowest, share, size, wrap=texture.wrap == "repeat"))
+    corners = [corner[::-1] for corner in product(*axes[::-1])]
+    texel = np.array([[place for place, _ in corner] for corner in corners])
+    weight = np.array([np.prod([part for _, part in corner], axis=0) for corner in corners])
+    value = texture.texels[tuple(np.moveaxis(texel, 1, 0)[::-1])]
+    return Footprint(np.moveaxis(texel, -1, 0), weight.T, np.moveaxis(value, 1, 0))
+
+
+def _neighbors(
+    lowest: Numbers, share: Numbers | None, size: int, *, wrap: bool
+) -> list[tuple[Numbers, Numbers]]:
+    """Return the places (n,) and weights (n,) of the texels along one axis that are mixed."""
+    if share is None:
+        return [(lowest, np.ones(len(lowest)))]
+    sides = (lowest, 1 - share), (lowest + 1, share)
+    return [(place % size if wrap else np.clip(place, 0, size - 1), part) for place, part in sides]
 
 
 def _cells(

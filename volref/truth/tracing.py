@@ -4,14 +4,12 @@ The same stages as the marcher's, run on a single ray with nothing left out, so 
 the marcher saw.  Sums are taken one by one, so the colour differs from the marcher's by rounding only.
 """
 
-import json
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from volref.arrays import Floats, Numbers, whole_number
+from volref.arrays import Floats, Numbers
 from volref.errors import SceneError
 from volref.planning import Plan
 from volref.records import Rays, Surface
@@ -21,6 +19,7 @@ from volref.stages.classify import segment_opacity
 from volref.stages.rays import pixel_rays
 from volref.stages.sampling import PAD, trilinear
 from volref.stages.spans import box_spans, cut_spans
+from volref.traces import Column, Trace, checked_pixel
 from volref.truth.canvas import light_behind
 from volref.truth.fields import Field, PlainField, Samples
 from volref.truth.integration import Integration
@@ -29,54 +28,25 @@ from volref.truth.meshes.surfaces import visible_surface
 from volref.truth.rendering import decide
 from volref.workspace import Workspace
 
-# name: (columns, meaning); what a row of the table holds.
-COLUMNS: dict[str, tuple[int, str]] = {
-    "segment": (1, "number of the segment, from 0"),
-    "t_start": (1, "world distance at which it starts"),
-    "t_end": (1, "world distance at which it ends"),
-    "t": (1, "world distance of the sample, its middle"),
-    "position": (3, "world position of the sample"),
-    "index": (3, "the same in index space (integer = voxel centre)"),
-    "cell": (3, "lowest corner of the cell, in index space"),
-    "fraction": (3, "place within the cell, 0..1"),
-    "corners": (8, "samples at the cell's corners, x fastest"),
-    "value": (1, "interpolated value"),
-    "color": (3, "straight colour of the transfer function"),
-    "strength": (1, "extinction or opacity of the transfer function, whichever it interpolates"),
-    "opacity": (1, "opacity of the segment"),
-    "transmittance": (1, "transmittance in front of the segment"),
-    "weight": (1, "opacity times transmittance"),
-    "accumulated": (4, "premultiplied RGBA up to and with the segment"),
+# What a row of the table holds.
+COLUMNS = {
+    "segment": Column(1, "number of the segment, from 0"),
+    "t_start": Column(1, "world distance at which it starts"),
+    "t_end": Column(1, "world distance at which it ends"),
+    "t": Column(1, "world distance of the sample, its middle"),
+    "position": Column(3, "world position of the sample", shown=False),
+    "index": Column(3, "the same in index space (integer = voxel centre)"),
+    "cell": Column(3, "lowest corner of the cell, in index space", shown=False),
+    "fraction": Column(3, "place within the cell, 0..1", shown=False),
+    "corners": Column(8, "samples at the cell's corners, x fastest", shown=False),
+    "value": Column(1, "interpolated value"),
+    "color": Column(3, "straight colour of the transfer function"),
+    "strength": Column(1, "extinction or opacity of the transfer function, whichever it interpolates"),
+    "opacity": Column(1, "opacity of the segment"),
+    "transmittance": Column(1, "transmittance in front of the segment"),
+    "weight": Column(1, "opacity times transmittance"),
+    "accumulated": Column(4, "premultiplied RGBA up to and with the segment"),
 }
-
-
-@dataclass(frozen=True, eq=False)
-class Trace:
-    """One ray in full: `head` (camera ray, span, surface, result) and `table`, name to array (S, columns)."""
-
-    head: dict[str, Any]
-    table: dict[str, Numbers]
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return the trace as plain data for JSON; infinite distances as null."""
-        rows = {name: column.tolist() for name, column in self.table.items()}
-        return {**self.head, "columns": {name: COLUMNS[name][1] for name in rows}, "segments": rows}
-
-    def to_json(self) -> str:
-        """Return the trace as JSON text."""
-        return json.dumps(self.as_dict(), allow_nan=False)
-
-    def __str__(self) -> str:
-        """Return the trace as a table for people, the widest columns left to the JSON."""
-        lines = [f"{name}: {_words(value)}" for name, value in self.head.items()]
-        if not self.table:
-            return "\n".join(lines)
-        shown = [name for name in self.table if name not in ("cell", "fraction", "corners", "position")]
-        lines.append("  ".join(f"{name:>{12 * COLUMNS[name][0]}}" for name in shown))
-        for row in range(len(self.table["segment"])):
-            cells = [f"{number:12.6g}" for name in shown for number in np.atleast_1d(self.table[name][row])]
-            lines.append("".join(cells))
-        return "\n".join(lines)
 
 
 def trace(
@@ -99,7 +69,7 @@ def trace(
     if decided.method != "march":
         message = f"plan must be a march's, got method {decided.method!r}; make one with method='march'"
         raise SceneError(message)
-    x, y = _checked_pixel(scene, pixel)
+    x, y = checked_pixel(pixel, scene.width, scene.height)
     flat = np.array([y * scene.width + x])
     rays = pixel_rays(scene.camera, scene.width, scene.height, flat)
     surface = visible_surface(scene) if scene.meshes else None
@@ -112,7 +82,7 @@ def trace(
         "behind": light_behind(scene, surface, flat)[0].tolist(),
     }
     if scene.volume is None:
-        return Trace({**head, "span": None, "ended": "no volume", "rgba": head["behind"]}, {})
+        return Trace({**head, "span": None, "ended": "no volume", "rgba": head["behind"]}, {}, COLUMNS)
     distance = np.inf if head["surface"] is None else head["surface"]["distance"]
     return _trace_volume(scene, decided, rays, distance, head)
 
@@ -153,7 +123,7 @@ def _trace_volume(scene: Scene, plan: Plan, rays: Rays, distance: float, head: d
         missed, cut = box.t_near[0] >= box.t_far[0], distance >= box.t_far[0]
         ended = "a clipping plane cuts it off" if cut else "a surface lies in front of the volume"
         ended = "the ray misses the volume" if missed else ended
-        return Trace({**head, "span": None, "ended": ended, "rgba": head["behind"]}, {})
+        return Trace({**head, "span": None, "ended": ended, "rgba": head["behind"]}, {}, COLUMNS)
     counts, steps = segments_of(spans, plan.step)
     number = np.arange(counts[0])
     start, length = t_near + number * steps[0], np.full(counts[0], steps[0])
@@ -174,15 +144,7 @@ def _trace_volume(scene: Scene, plan: Plan, rays: Rays, distance: float, head: d
         "ended": f"the ray {met}",
         "rgba": rgba.tolist(),
     }
-    return Trace(head, {name: table[name] for name in COLUMNS if name in table})
-
-
-def _checked_pixel(scene: Scene, pixel: Sequence[int]) -> tuple[int, int]:
-    if not isinstance(pixel, Sequence) or len(pixel) != 2:
-        message = f"pixel must be two numbers x, y, got {pixel!r}; count from the top left, from 0"
-        raise SceneError(message)
-    x = whole_number("pixel x", pixel[0], low=0, high=scene.width - 1)
-    return x, whole_number("pixel y", pixel[1], low=0, high=scene.height - 1)
+    return Trace(head, {name: table[name] for name in COLUMNS if name in table}, COLUMNS)
 
 
 def _table(field: Field, start: Floats, length: Floats, index: Floats, viewer: Floats) -> dict[str, Numbers]:
@@ -235,11 +197,3 @@ def _corner_samples(values: Numbers, cell: Numbers) -> Floats:
     limit = np.array(values.shape[::-1]) - 1
     x, y, z = np.moveaxis(np.clip(cell[:, None] + corner, 0, limit), -1, 0)
     return np.asarray(values[z, y, x], dtype=np.float64)
-
-
-def _words(value: object) -> str:
-    if isinstance(value, dict):
-        return ", ".join(f"{name} {_words(part)}" for name, part in value.items())
-    if isinstance(value, list):
-        return " ".join(map(_words, value))
-    return f"{value:.6g}" if isinstance(value, float) else str(value)
