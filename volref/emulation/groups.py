@@ -251,6 +251,16 @@ class VolumeTexture(Switches):
             },
         ),
     ] = "box"
+    seam: Annotated[
+        str,
+        Word(
+            "what lies beyond the first and the last azimuth of a radar's texture",
+            {
+                "clamped": "its edge: between the last column and the first nothing is interpolated",
+                "wrapped": "a copy of the column at the other end",
+            },
+        ),
+    ] = "clamped"
 
 
 @dataclass(frozen=True)
@@ -262,7 +272,7 @@ class TableTexture(Switches):
     steepest: Annotated[
         float | None,
         Real(
-            "the gradient magnitude, in value units per world unit, that v = 1 stands for when rows are baked "
+            "the gradient's magnitude, in value units per world unit, that v = 1 stands for in the rows "
             "(None: that of |g| = 1 in a gradient texture)",
             low=1e-30,
         ),

@@ -7,7 +7,7 @@ from volref.arrays import Floats, float_array, whole_number
 
 
 def hash_jitter(width: int, height: int, u: ArrayLike) -> Floats:
-    """Return fract(sin(dot(uv, 79.30408 u)) 43758.5453) at the centres of pixels (height, width), row 0 = top.
+    """Return fract(sin(dot(uv, 79.30408 u)) 43758.5453) at the centres of pixels (height, width), top first.
 
     u is a unit vector (2,) that the program draws anew for each frame; uv is 0..1 with v upwards.  This is
     computed in float64: a shader's sin is off by up to 2e-4 on one machine and 7e-8 on another, of which the

@@ -102,18 +102,18 @@ def baked_table(scene: Scene, pipeline: Pipeline, domain: tuple[float, float]) -
     """
     table, transfer = pipeline.table, scene.transfer
     along = domain[0] + (domain[1] - domain[0]) * baked_at(table)
-    values = np.tile(along, table.rows)
     up = (np.arange(table.rows) + 0.5) / table.rows * steepest(scene, table, domain)
     magnitudes = np.repeat(up, table.size)
     if isinstance(transfer, TransferFunction2D):
-        colors, opacity = lookup_2d(transfer, values, magnitudes)
+        colors, opacity = lookup_2d(transfer, np.tile(along, table.rows), magnitudes)
     else:
         assert transfer is not None
         work = Workspace()
-        colors, strength = classify(lookup_table(transfer, domain), values, work)
+        row, strength = classify(lookup_table(transfer, domain), along, work)
         if transfer.interpolation == "extinction":
             strength = segment_opacity(transfer, strength, transfer.unit_distance)
-        opacity = strength * gradient_factor(transfer, magnitudes)
+        colors = np.tile(row, table.rows)
+        opacity = np.tile(strength, table.rows) * gradient_factor(transfer, magnitudes)
     entries = np.concatenate([colors, opacity[None]]).T.reshape(table.rows, table.size, 4)
     if table.last_column == "empty":
         entries[:, -1] = 0.0
