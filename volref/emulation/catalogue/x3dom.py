@@ -42,6 +42,6 @@ PIPELINES = (
         lighting=Lighting(factor=1.2),
         accumulation=Accumulation(rule="over"),
         meshes=MeshCut(kind="none"),
-        output=Output(blend="additive-alpha", precision="mediump"),
+        output=Output(blend="additive-alpha"),
     ),
 )
