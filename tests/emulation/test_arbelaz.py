@@ -6,8 +6,10 @@ import pytest
 from tests.oracles.arbelaz import Pixel, Setting
 from volref import Camera, Mesh, Scene, TransferFunction, Volume, emulate
 from volref.emulation.catalogue import named
+from volref.emulation.composition import with_object
 from volref.emulation.device import Device
 from volref.emulation.opacity import factor_of
+from volref.emulation.packing import unpacked
 from volref.emulation.passes import prepare
 from volref.emulation.uploads import uploads_of
 
@@ -84,3 +86,99 @@ def test_every_pixel_is_that_of_a_scalar_loop(where, name):
             np.testing.assert_allclose(found.rgba[y, x], color, rtol=0, atol=1e-11)
             hits += hit
     assert (hits > 8) == (where in ("inside", "through"))
+
+
+def facing(near=4.0, plates=(), name="arbelaz2016", **switches):
+    """Numbers of the middle pixel, whose ray runs along z through the middle of the box."""
+    camera = ((5.0, 7.0, 36.0), (5.0, 7.0, 0.0), (0, 1, 0), 30.0, near, 90.0)
+    scene = Scene(
+        Volume(slices(), spacing=SPACING),
+        TransferFunction.from_opacity([0, 255], [(1, 1, 1)] * 2, [0.0, 0.1]),
+        Camera.look_at(*camera),
+        21,
+        15,
+        [plate_mesh(*plate) for plate in plates],
+    )
+    return emulate(scene, named(name).with_switches(**switches), EXACT)
+
+
+# The box of `facing` is 14 deep and a step 0.07 long: this plate lies between samples 99 and 100.
+HALFWAY = ((-20, -20, 6.02), (60, 0, 0), (0, 60, 0), (1.0, 0.0, 0.0))
+
+
+def test_as_printed_alpha_dips_to_three_quarters():
+    """A A + (1 - A) has its least value at A = 1/2; an opaque object must give 1."""
+    alpha = np.linspace(0, 1, 1001)
+    gray = np.stack([alpha * 0.5] * 3 + [alpha], axis=1)
+    white = np.ones((1, 4))
+    printed, working = (with_object(gray, white, rule) for rule in ("printed", "over"))
+    assert printed[:, 3].min() == printed[500, 3] == 0.75
+    assert (working[:, 3] == 1).all()
+
+
+def test_as_printed_a_premultiplied_color_is_darkened_by_up_to_a_quarter():
+    alpha = np.linspace(0, 1, 1001)
+    white_fog = np.stack([alpha] * 4, axis=1)
+    black = np.zeros((1, 4))
+    printed, working = (with_object(white_fog, black, rule)[:, 0] for rule in ("printed", "over"))
+    assert (working - printed).max() == pytest.approx(0.25, abs=1e-15)
+    # Of a straight colour the printed form is right.
+    straight = np.concatenate([np.ones((1001, 3)), alpha[:, None]], axis=1)
+    np.testing.assert_array_equal(with_object(straight, black, "printed")[:, 0], alpha)
+
+
+def test_as_printed_blending_multiplies_by_alpha_once_more():
+    straight, right = (
+        facing(output={"blend": blend, "format": "exact"}) for blend in ("straight", "premultiplied")
+    )
+    color, alpha = right.rgba[7, 10, 0], right.rgba[7, 10, 3]
+    assert 0.2 < alpha < 0.8
+    assert straight.rgba[7, 10, 0] == pytest.approx(color * alpha, rel=1e-14)
+
+
+def test_as_printed_the_ray_ends_one_step_before_the_surface():
+    early, at = (
+        facing(plates=[HALFWAY], meshes={"comparison": rule, "packing": "exact"}).samples[7, 10]
+        for rule in ("one-step-early", "at")
+    )
+    assert (early, at) == (99, 100)
+
+
+@pytest.mark.parametrize(("near", "steps"), [(4.0, 119), (0.001, 124)])
+def test_as_printed_a_mesh_halfway_is_met_further_on(near, steps):
+    """Of v = z / w it is (v(middle) - v(front)) / (v(back) - v(front)) of the way."""
+    found = facing(near, [HALFWAY], meshes={"depth": "window-over-w", "packing": "exact"}).samples[7, 10]
+    front, middle, back = ((1 - near / d) / d for d in (36.0 - 13.0, 36.0 - 6.02, 36.0 + 1.0))
+    expected = (middle - front) / (back - front)
+    assert found == int(np.ceil(200 * expected)) == steps
+    assert facing(near, [HALFWAY], meshes={"packing": "exact"}).samples[7, 10] == 100
+
+
+def test_as_printed_depth_runs_backwards_between_the_near_plane_and_twice_that():
+    """Window z / w is greatest at w = 2 near; here the front face is nearer and the back further away."""
+    camera = ((5.0, 7.0, 16.0), (5.0, 7.0, 0.0), (0, 1, 0), 30.0, 2.9, 90.0)
+    printed, linear = (
+        prepare(scene_of([], camera), named(name), EXACT).cut
+        for name in ("arbelaz2016-printed", "arbelaz2016")
+    )
+    assert (printed.step < 0).all()
+    assert (linear.step > 0).all()
+
+
+def test_cleared_to_white_a_depth_target_would_end_every_ray_at_once():
+    white = unpacked(np.ones((1, 4)), "printed")[0]
+    depths = prepare(scene_of([]), named("arbelaz2016-printed"), EXACT).cut.depth
+    assert 1 - white == pytest.approx(-0.0039, abs=5e-5)
+    assert (depths > 1 - white).all()
+
+
+def test_rays_that_leave_through_a_face_at_0_are_ended_by_the_count_alone():
+    """`any(rpos > 1)` ends a ray beyond 1 only; with more steps than lead to the exit it shows."""
+    through_0 = facing(name="arbelaz2016-printed", stepping={"cap": 300}).samples[7, 10]
+    behind = ((5.0, 7.0, -24.0), (5.0, 7.0, 0.0), (0, 1, 0), 30.0, 4.0, 90.0)
+    through_1 = emulate(
+        scene_of([], behind), named("arbelaz2016-printed").with_switches(stepping={"cap": 300}), EXACT
+    ).samples[HEIGHT // 2, WIDTH // 2]
+    assert through_0 == 300
+    # Sample 200 lies on the exit, 1 but for the rounding of 200 sums; sample 201 is beyond it.
+    assert through_1 in (201, 202)
