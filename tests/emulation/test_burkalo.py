@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.oracles import burkalo as oracle
-from volref import Camera, Scene, SceneError, TransferFunction, Volume, emulate
+from volref import Camera, Scene, SceneError, TransferFunction, Volume, emulate, render
 from volref.emulation.catalogue import named
 from volref.emulation.device import Device
 from volref.emulation.passes import prepare
@@ -169,6 +169,28 @@ def test_half_the_sampling_rate_thins_what_is_not_corrected():
         for steps in (32, 16)
     ]
     assert corrected[0] == pytest.approx(corrected[1], abs=1e-6)  # float32 lengths of steps
+
+
+def test_without_the_stop_corrected_opacity_tends_to_the_truth_in_the_first_order_and_as_it_is_does_not():
+    ramp = np.linspace(0, 255, 9).round().astype(np.uint8)[:, None, None]
+    volume = Volume(np.broadcast_to(ramp, (9, 9, 9)).copy(), spacing=(1 / 9,) * 3)
+    table = TransferFunction.from_opacity(
+        [0, 255], [(1, 0.2, 0.1), (0.1, 0.4, 1)], [0.2, 0.9], unit_distance=0.5
+    )
+    camera = Camera.look_at((2.1, 1.7, 2.3), (0.45, 0.45, 0.45), (0, 0, 1), 25.0, 0.5, 9.0)
+    scene = Scene(volume, table, camera, 12, 10)
+    truth = render(scene).rgba
+    errors = {}
+    for rule in ("corrected", "as-is"):
+        for steps in (66, 132, 264, 528):
+            stepping, wide = {"steps": steps, "opaque_at": None}, {"format": "exact", "size": 4096}
+            switches = {"stepping": stepping, "opacity": {"rule": rule}, "table": wide}
+            drawn = emulate(scene, raw(volume={"format": "exact"}, **switches)).rgba
+            errors.setdefault(rule, []).append(np.abs(drawn - truth).mean())
+    halved = np.array(errors["corrected"][:-1]) / errors["corrected"][1:]
+    # How much of the last step lies behind the exit is all but random.
+    assert ((halved > 1.7) & (halved < 2.4)).all()
+    assert (np.diff(errors["as-is"]) > 0).all()
 
 
 @pytest.mark.parametrize(("steps", "count"), [(20, 20), (50, 51), (100, 101), (128, 128), (200, 201)])
