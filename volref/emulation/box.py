@@ -6,9 +6,10 @@ from functools import cached_property
 import numpy as np
 
 from volref.arrays import Floats, Integers
+from volref.emulation.radar_image import reach
+from volref.scene.radar import RadarVolume
 from volref.scene.scene import Scene
 from volref.scene.transform import affine, invert_affine
-from volref.scene.volume import Volume
 
 # The corners of the unit cube, x fastest, and its faces as triangles, counter-clockwise from outside.
 CORNERS = np.array([[k & 1, k >> 1 & 1, k >> 2 & 1] for k in range(8)], dtype=np.float64)
@@ -51,14 +52,17 @@ class Box:
 
 
 def box_of(scene: Scene) -> Box:
-    """Return where the texture space of a scene's volume lies."""
-    if isinstance(scene.volume, Volume):
+    """Return where the texture space of a scene's volume lies.
+
+    That of a radar is the cube around it that its farthest gates touch, the antenna in the middle.
+    """
+    assert scene.volume is not None
+    if isinstance(scene.volume, RadarVolume):
+        side = 2 * reach(scene.volume)
+        world_from_texture = affine(side * np.eye(3), np.array(scene.volume.origin) - side / 2)
+    else:
         low, high = scene.volume.index_bounds
         world_from_texture = scene.volume.world_from_index @ affine(np.diag(high - low), low)
-    else:
-        corners = scene.corners
-        low, high = corners.min(axis=0), corners.max(axis=0)
-        world_from_texture = affine(np.diag(high - low), low)
     camera = scene.camera
     clip_from_world = camera.clip_from_view(scene.width, scene.height) @ camera.view_from_world
     return Box(world_from_texture, clip_from_world @ world_from_texture)

@@ -60,6 +60,17 @@ class Device(Switches):
             {"divided": "a division", "multiplied": "a product with the rounded reciprocal"},
         ),
     ] = "divided"
+    angles: Annotated[
+        str,
+        Word(
+            "how atan(y, x) and acos(x) are computed",
+            {
+                "rounded": "as exactly as the type holds",
+                "swiftshader": "by SwiftShader's polynomials, up to 7e-5 beside them",
+                "mesa": "by Mesa's, up to 1.6e-4 beside them",
+            },
+        ),
+    ] = "rounded"
     srgb: Annotated[
         str,
         Word(
@@ -81,6 +92,13 @@ class Device(Switches):
             {"snapped": "those rounded to `subpixel_bits`", "unsnapped": "those of the vertex shader"},
         ),
     ] = "snapped"
+    detail: Annotated[
+        str,
+        Word(
+            "how the level of detail is computed from a footprint",
+            {"log2": "its logarithm", "bits": "SwiftShader's line between powers of two, up to 0.022 below"},
+        ),
+    ] = "log2"
     depth_bits: Annotated[int, Whole("bits of a depth buffer, 32 for floats", low=16, high=32)] = 32
     fragment_position: Annotated[
         str, Word("arithmetic of gl_FragCoord in WebGL 1, where it is mediump", ARITHMETIC)
@@ -134,12 +152,14 @@ PRESETS: dict[str, Device] = {
             nearest_bits=16,
             subpixel_bits=4,
             constant_divisor="multiplied",
+            angles="swiftshader",
         ),
         Device(
             "llvmpipe",
             weight_bits=8,
             result_bits=8,
             subpixel_bits=8,
+            angles="mesa",
             srgb="cubic",
             planes="unsnapped",
             depth_bits=24,
@@ -155,6 +175,7 @@ PRESETS: dict[str, Device] = {
             planes="unsnapped",
             depth_bits=24,
             mix="sum",
+            angles="mesa",
             blend="integer",
         ),
         Device("mediump", values="float16", control="float16", fragment_position="float16"),

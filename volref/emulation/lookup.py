@@ -12,7 +12,9 @@ from volref.arrays import Floats
 from volref.emulation.device import Device
 from volref.emulation.gradient_volume import has_gradient_volume, unpacked
 from volref.emulation.pipeline import Pipeline
+from volref.emulation.radar_image import PolarGrid
 from volref.emulation.slices import SlicePair, slice_pair
+from volref.emulation.spherical import sweep_pair
 from volref.emulation.uploads import Uploads, table_place, table_texture, volume_texture
 from volref.stages.textures import Texture, fetch, fetch_slices
 from volref.workspace import Workspace
@@ -40,17 +42,20 @@ class Textures:
     table: Texture
     size: tuple[int, int, int]
     tiles: tuple[int, int]
+    grid: PolarGrid | None = None
 
 
 def textures_of(uploads: Uploads, pipeline: Pipeline, device: Device) -> Textures:
     """Return the textures of a program as a device samples them."""
     volume, table = (make(uploads, pipeline, device) for make in (volume_texture, table_texture))
-    return Textures(pipeline, device, volume, table, uploads.size, uploads.tiles)
+    return Textures(pipeline, device, volume, table, uploads.size, uploads.tiles, uploads.grid)
 
 
 def look_up(textures: Textures, position: Floats, work: Workspace) -> Found:
     """Return what the program finds at positions."""
     order = textures.pipeline.table.order
+    if textures.grid is not None:
+        return _between_sweeps(textures, textures.grid, position, work)
     if textures.pipeline.volume.layout == "3d":
         found = fetch(textures.volume, position, work)
         if order == "pre":
@@ -75,9 +80,7 @@ def look_up(textures: Textures, position: Floats, work: Workspace) -> Found:
     return Found(value, classified(textures, value, work))
 
 
-def classified(
-    textures: Textures, value: Floats, work: Workspace, magnitude: Floats | None = None
-) -> Floats:
+def classified(textures: Textures, value: Floats, work: Workspace, magnitude: Floats | None = None) -> Floats:
     """Return the table's colour (4, n) of values (n,), and of |g| (n,) as its v; without it v is 1/2."""
     place = table_place(textures.pipeline.table, value)
     if magnitude is not None:
@@ -101,6 +104,14 @@ def _per_slice(textures: Textures, pair: SlicePair, work: Workspace) -> Found:
     one = classified(textures, values[0], work)
     two = classified(textures, values[1], work)
     return Found(_between(textures, values[0], values[1], pair), _between(textures, one, two, pair))
+
+
+def _between_sweeps(textures: Textures, grid: PolarGrid, position: Floats, work: Workspace) -> Found:
+    pair, seen = sweep_pair(textures.pipeline.volume, grid, position, textures.device)
+    values = fetch_slices(textures.volume, *pair[3:], work)
+    mixed = _between(textures, *values, pair)
+    value = np.where(seen, mixed, mixed.dtype.type(0))
+    return Found(value, classified(textures, value, work))
 
 
 def _between(textures: Textures, one: Floats, two: Floats, pair: SlicePair) -> Floats:

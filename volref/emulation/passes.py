@@ -36,10 +36,12 @@ from volref.emulation.meshes import Surfaces, check_meshes, distances, surfaces_
 from volref.emulation.opacity import OpacityRule, opacity_rule
 from volref.emulation.paths import Ends, Paths, paths_of
 from volref.emulation.pipeline import Pipeline
+from volref.emulation.radar_image import check_spherical, is_spherical
 from volref.emulation.result import Emulation
 from volref.emulation.shading import check_gradients, shader_of
 from volref.emulation.uploads import Uploads, decoded_or, uploads_of
 from volref.errors import SceneError
+from volref.scene.radar import RadarVolume
 from volref.scene.scene import Scene
 from volref.scene.volume import Volume
 
@@ -213,10 +215,16 @@ def start_offsets(scene: Scene, pipeline: Pipeline, jitter: ArrayLike | None, fr
 
 def check_drawable(scene: Scene, pipeline: Pipeline) -> None:
     """Refuse scenes that hold what no program here draws."""
-    if not isinstance(scene.volume, Volume):
-        message = f"scene.volume must be a Volume for pipeline {pipeline.name!r}, got "
+    wanted = RadarVolume if is_spherical(pipeline.volume) else Volume
+    if not isinstance(scene.volume, wanted):
+        message = f"scene.volume must be a {wanted.__name__} for pipeline {pipeline.name!r}, got "
         message += f"{'none' if scene.volume is None else type(scene.volume).__name__}; "
-        raise SceneError(message + "give one, or resample the radar")
+        cure = (
+            "choose a pipeline for grids" if wanted is RadarVolume else "choose one for radars, or resample"
+        )
+        raise SceneError(message + f"give one, or {cure}")
+    if wanted is RadarVolume:
+        check_spherical(pipeline)
     if scene.mode != "composite" or scene.clip:
         got = "clipping planes" if scene.clip else f"mode {scene.mode!r}"
         message = f"scene must be a composite without clipping planes to be emulated, got {got}; "

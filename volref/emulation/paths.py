@@ -13,6 +13,7 @@ from volref.emulation.box import Box
 from volref.emulation.device import Device
 from volref.emulation.groups import Stepping
 from volref.emulation.pipeline import Pipeline
+from volref.scene.radar import RadarVolume
 from volref.scene.scene import Scene
 from volref.scene.volume import Volume
 
@@ -96,7 +97,9 @@ def world_step_of(stepping: Stepping, scene: Scene) -> float:
     """Return the length of a step of rule "world-length"."""
     if stepping.length is not None:
         return stepping.length
-    assert isinstance(scene.volume, Volume)
+    assert scene.volume is not None
+    if isinstance(scene.volume, RadarVolume):
+        return scene.volume.gate_length / 2
     return min(scene.volume.spacing) / 2
 
 

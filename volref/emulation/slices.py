@@ -55,6 +55,18 @@ def slice_pair(
     if switches.between == "x":
         share = x * kind(count) - first
     x, y = (_in_tile(switches, axis, length) for axis, length in ((x, size[0]), (y, size[1])))
+    return SlicePair(first, second, share, *in_atlas(switches, (first, second), (x, y), tiles))
+
+
+def in_atlas(
+    switches: VolumeTexture,
+    slices: tuple[Floats, Floats],
+    place: tuple[Floats, Floats],
+    tiles: tuple[int, int],
+) -> tuple[Floats, Floats, Floats, Floats]:
+    """Return u1, v1, u2 and v2 of a place (x, y) in two slices (eq. 7 to 14)."""
+    (first, second), (x, y) = slices, place
+    kind = x.dtype.type
     if switches.rows == "against-v":
         y = kind(1) - y
     across, down = kind(tiles[0]), kind(tiles[1])
@@ -64,7 +76,7 @@ def slice_pair(
         columns = columns[0], np.floor(second / across)
     rows = (_row(switches, s, across, down) for s in (first, second))
     v1, v2 = (row + y for row in rows)
-    return SlicePair(first, second, share, columns[0] + x, v1, columns[1] + x, v2)
+    return columns[0] + x, v1, columns[1] + x, v2
 
 
 def _in_tile(switches: VolumeTexture, place: Floats, texels: int) -> Floats:

@@ -20,8 +20,10 @@ from volref.emulation.device import Device
 from volref.emulation.gradient_volume import SOBEL_GAIN, has_gradient_volume, with_gradient
 from volref.emulation.groups import TableTexture, VolumeTexture
 from volref.emulation.pipeline import Pipeline
+from volref.emulation.radar_image import PolarGrid, polar_grid, polar_image
 from volref.formats import codes_of, decoded, stored
 from volref.image import decode_srgb, encode_srgb
+from volref.scene.radar import RadarVolume
 from volref.scene.scene import Scene
 from volref.scene.transfer import TransferFunction
 from volref.scene.transfer2d import TransferFunction2D
@@ -41,7 +43,8 @@ class Uploads:
 
     volume: (D, H, W, C) of a 3-D texture, or (H, W, C) of an atlas.  table: straight (rows, n, 4), colours
     encoded where the texture decodes them.  domain: the values that 0 and 1 stand for.  size: voxels
-    (nx, ny, nz).  tiles: (across, down) of an atlas.
+    (nx, ny, nz), of a radar radials, gates and sweeps.  tiles: (across, down) of an atlas.  grid: where the
+    texels of a radar lie.
     """
 
     volume: Numbers
@@ -49,22 +52,25 @@ class Uploads:
     domain: tuple[float, float]
     size: tuple[int, int, int]
     tiles: tuple[int, int]
+    grid: PolarGrid | None = None
 
 
 def uploads_of(scene: Scene, pipeline: Pipeline) -> Uploads:
-    """Return what the program uploads for a scene with a volume on a grid."""
-    assert isinstance(scene.volume, Volume)
+    """Return what the program uploads for a scene with a volume."""
+    assert scene.volume is not None
     assert scene.transfer is not None
     domain = domain_of(scene, pipeline)
     entries = baked_table(scene, pipeline, domain)
     if pipeline.table.srgb:
         entries[..., :3] = encode_srgb(entries[..., :3])
     table = _as_uploaded(entries, pipeline.table.format)
-    # float64 from the start: the difference of two codes of a narrow type may not fit it.
-    unit = (scene.volume.values.astype(np.float64) - domain[0]) / (domain[1] - domain[0])
+    values, size, grid = _values_of(scene.volume, pipeline)
+    unit = (values - domain[0]) / (domain[1] - domain[0])
     channels = unit[..., None]
     if pipeline.table.order == "pre":
-        texture = Texture(np.asarray(_as_fetched(table, pipeline.table, Device(), np.float64)), pipeline.table.filter)
+        texture = Texture(
+            np.asarray(_as_fetched(table, pipeline.table, Device(), np.float64)), pipeline.table.filter
+        )
         place = table_place(pipeline.table, unit.reshape(-1))
         found = fetch(texture, (place, np.full_like(place, 0.5)), Workspace())
         channels = np.moveaxis(found, 0, -1).reshape(*unit.shape, 4)
@@ -74,7 +80,24 @@ def uploads_of(scene: Scene, pipeline: Pipeline) -> Uploads:
         texels = with_gradient(texels, pipeline.lighting, pipeline.volume.format)
     if pipeline.volume.layout == "atlas":
         texels = atlas_of(texels, pipeline.volume, tiles)
-    return Uploads(texels, table, domain, scene.volume.size, tiles)
+    return Uploads(texels, table, domain, size, tiles, grid)
+
+
+def _values_of(
+    volume: Volume | RadarVolume, pipeline: Pipeline
+) -> tuple[Floats, tuple[int, int, int], PolarGrid | None]:
+    """Return the values (nz, ny, nx) to upload, their numbers along x, y and z, and the grid of a radar.
+
+    They are float64 from the start: the difference of two codes of a narrow type may not fit it.  Gates
+    without data are uploaded as the least of all values, for a byte has no other.
+    """
+    if isinstance(volume, Volume):
+        return volume.values.astype(np.float64), volume.size, None
+    grid = polar_grid(volume)
+    values = polar_image(volume, grid, pipeline.volume.seam)
+    low = volume.value_bounds[0] if pipeline.domain is None else pipeline.domain[0]
+    values = np.where(np.isnan(values), low, values)
+    return values, (grid.columns, grid.gates, len(grid.tilts)), grid
 
 
 def domain_of(scene: Scene, pipeline: Pipeline) -> tuple[float, float]:
@@ -124,7 +147,7 @@ def steepest(scene: Scene, table: TableTexture, domain: tuple[float, float]) -> 
     """Return the magnitude, in value units per world unit, that v = 1 of a table stands for.
 
     The table's own; else that of |g| = 1 in a gradient volume: a field that grows by 27 / 32 of the domain
-    per voxel, of mean spacing.
+    per voxel, of mean spacing.  A radar has neither: its table has one row, where any will do.
 
     Examples
     --------
@@ -137,7 +160,8 @@ def steepest(scene: Scene, table: TableTexture, domain: tuple[float, float]) -> 
     """
     if table.steepest is not None:
         return table.steepest
-    assert isinstance(scene.volume, Volume)
+    if not isinstance(scene.volume, Volume):
+        return domain[1] - domain[0]
     return (domain[1] - domain[0]) / SOBEL_GAIN / float(np.mean(scene.volume.spacing))
 
 
@@ -235,9 +259,7 @@ def decoded_or(texels: Numbers, kind: np.typing.DTypeLike) -> Floats:
     return decoded(texels, kind) if texels.dtype.kind == "u" else texels.astype(kind, copy=False)
 
 
-def _as_fetched(
-    table: Numbers, switches: TableTexture, device: Device, kind: np.typing.DTypeLike
-) -> Floats:
+def _as_fetched(table: Numbers, switches: TableTexture, device: Device, kind: np.typing.DTypeLike) -> Floats:
     """Return a table's texels (1 or more rows, n, 4) as a fetch gives them."""
     texels = decoded_or(table, kind)
     if switches.srgb:

@@ -2,11 +2,21 @@
 
 from functools import cache
 
-from volref.emulation.catalogue import arbelaz, barbagallo, baseline, burkalo, cej, congote, vpt, x3dom
+from volref.emulation.catalogue import (
+    arbelaz,
+    barbagallo,
+    baseline,
+    burkalo,
+    cej,
+    congote,
+    congote_radar,
+    vpt,
+    x3dom,
+)
 from volref.emulation.pipeline import Pipeline
 from volref.errors import SceneError
 
-MODULES = (baseline, arbelaz, congote, barbagallo, cej, vpt, x3dom, burkalo)
+MODULES = (baseline, arbelaz, congote, congote_radar, barbagallo, cej, vpt, x3dom, burkalo)
 
 
 @cache
