@@ -193,6 +193,15 @@ def test_flat_regions_are_lit_from_the_corner_1_1_1_with_the_misprint_put_right(
     assert from_behind == exact == 0.0
 
 
+@pytest.mark.parametrize(("slope", "lit"), [(0.0005, False), (0.002, True)])
+def test_a_gradient_below_a_thousandth_has_no_direction(slope, lit):
+    ramp = vr.Volume(0.5 + slope * (np.arange(9.0) - 4) + np.zeros((9, 9, 9)))
+    shown = dataclasses.replace(flat_scene((1, 0, 0)), volume=ramp)
+    exact = WORKING.with_switches(volume={"format": "exact"}, output=FLOATING)
+    shown = vr.emulate(shown, dataclasses.replace(exact, domain=(0.0, 1.0)))
+    assert (shown.rgba[..., 0].max() > 0.3) == lit
+
+
 def test_a_uniform_light_of_1_leaves_colours_alone_and_no_light_is_taken_for_it():
     bright = vr.emulate(scene((vr.Light.ambient(),), MATERIALS[0]), PRINTED)
     assert_array_equal(bright.rgba, vr.emulate(scene(), PRINTED).rgba)
@@ -212,10 +221,10 @@ def test_every_light_with_a_direction_brings_the_ambient_part_along():
     assert_allclose(two[..., :3], 2 * one[..., :3], rtol=1e-6)  # stored in float32
 
 
-def test_what_has_no_gradient_at_all_is_left_out_as_published_and_shown_as_put_right():
+@pytest.mark.parametrize("lights", [(), (vr.Light.ambient(),)])
+def test_what_has_no_gradient_at_all_is_left_out_as_published_and_shown_as_put_right(lights):
     """In a texture of floats no gradient is exactly 0, and the code's `mag > 0` leaves it out."""
-    shown = flat_scene((-1, -1, -1))
-    shown = dataclasses.replace(shown, lights=(), material=None)
+    shown = dataclasses.replace(flat_scene((-1, -1, -1)), lights=lights)
     printed = PRINTED.with_switches(volume={"format": "float"}, lighting={"gradient": "sobel-bytes"})
     assert not vr.emulate(shown, printed).rgba[..., :3].any()
     assert vr.emulate(shown, WORKING.with_switches(volume={"format": "float"})).rgba[3, 4, 0] > 0.9
