@@ -128,7 +128,7 @@ def mean_of_frames(mean: Floats, frame: Floats, number: int, output: Output, dev
     assert output.mean_format is not None
     before = _as_read(mean, output.mean_format, device)
     now = _as_read(frame, output.format, device)
-    mixed = mix(device, before, now, before.dtype.type(1 / number))
+    mixed = mix(device, before, now, np.array(1 / number, before.dtype))
     return store(mixed.astype(mean.dtype), output.mean_format, device)
 
 

@@ -1,15 +1,13 @@
 """Rays of a slab test between the near and the far plane, unprojected by the inverse of the matrices: VPT.
 
-A triangle covers the screen.  At its corners, in its vertex shader, clip positions (x, y, -1, 1) and
-(x, y, 1, 1) are turned into texture space and divided by w; between them they are linear on the screen.  The
-matrix is a float32 uniform whose rows cancel for far planes: so all is computed in the control type, operation
-by operation as the shaders do.  R rays, of all pixels.
+A triangle covers the screen, its corners a, b and c at (-1, -1), (3, -1) and (-1, 3).  There, in the vertex
+shader, clip positions (x, y, -1, 1) and (x, y, 1, 1) are turned into texture space and divided by w; between
+them they are linear on the screen:
 
-    corners (-1, 3)
-             | \\
-             |   \\          near(x, y) = a + (b - a) (x + 1) / 4 + (c - a) (y + 1) / 4
-             |_____\\        with a, b and c at the corners (-1, -1), (3, -1) and (-1, 3)
-       (-1, -1)    (3, -1)
+    near(x, y) = a + (b - a) (x + 1) / 4 + (c - a) (y + 1) / 4      and far(x, y) likewise
+
+The matrix is a float32 uniform whose rows cancel for far planes: so all is computed in the control type,
+operation by operation as the shaders do.  R rays, of all pixels.
 """
 
 import numpy as np
@@ -30,7 +28,7 @@ def unprojected_ends(scene: Scene, box: Box, device: Device, surface: Floats | N
 
     A ray ends at the latest at the world distance `surface` (H * W, 1) from where distances are measured.
     """
-    near, far = (_on_plane(scene, box, device, scene_z) for scene_z in (-1.0, 1.0))
+    near, far = (_on_plane(scene, box, device, z) for z in (-1.0, 1.0))
     begin, end = _slab(near, far - near)
     if surface is not None:
         end = np.minimum(end, _at_distance(scene, box, near, far, surface[:, 0]))
@@ -40,9 +38,7 @@ def unprojected_ends(scene: Scene, box: Box, device: Device, surface: Floats | N
 
 
 def _on_plane(scene: Scene, box: Box, device: Device, z: float) -> Floats:
-    """Return the points (3, R) in texture space that pixel centres have at clip depth z of the far plane, 1,
-    or the near one, -1, of matrices whose z runs from -1 to 1.
-    """
+    """Return the points (3, R) in texture space of pixel centres on the near plane, z = -1, or the far, 1."""
     kind = device.control_type
     matrix = texture_from_clip(scene, box).astype(kind)
     corners = []
@@ -82,4 +78,4 @@ def _at_distance(scene: Scene, box: Box, near: Floats, far: Floats, distance: Fl
     start = begin if scene.camera.is_parallel else scene.camera.world_from_view[:3, 3]
     before = np.linalg.norm(begin - start, axis=1)
     t = (distance - before) / np.linalg.norm(end - begin, axis=1)
-    return t.astype(near.dtype)
+    return np.asarray(t, near.dtype)

@@ -270,7 +270,7 @@ def _as_fetched(table: Numbers, switches: TableTexture, device: Device, kind: np
 
 
 def mesa_srgb(codes: Floats) -> Floats:
-    """Return what Mesa makes of sRGB codes of 0..1 (lp_bld_format_srgb.c): a line up to 15 / 255, a cubic beyond.
+    """Return the light that Mesa makes of sRGB codes 0..1 (lp_bld_format_srgb.c): a line, then a cubic.
 
     Examples
     --------

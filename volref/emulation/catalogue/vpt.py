@@ -1,4 +1,4 @@
-"""VPT's emission-absorption renderer (EAM), the base of seed 004: Lesar and others, 2018 (github.com/terier/vpt).
+"""VPT's emission-absorption renderer (EAM), the base of seed 004: Lesar and others (github.com/terier/vpt).
 
 One triangle covers the screen; near and far plane are unprojected into the unit cube of texture space, and a
 slab test cuts the ray.  Each ray has the same number of samples, at an offset that is drawn anew for each
