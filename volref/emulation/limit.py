@@ -76,8 +76,8 @@ def widened(pipeline: Pipeline) -> Pipeline:
 def refined(scene: Scene, pipeline: Pipeline, times: int) -> Pipeline:
     """Return a program whose step is `times` finer.
 
-    An opacity that is not corrected for the step becomes one that is, for the step that it is taken to mean;
-    no alpha ends a ray.
+    An opacity that is not corrected for the step becomes one that is, for the step that it is taken to mean,
+    on boxes with unequal sides the mean one of all rays; no alpha ends a ray.
     """
     stepping = pipeline.stepping
     changes: dict[str, Plain] = {"opaque_at": None, "steps": stepping.steps * times}
@@ -91,7 +91,7 @@ def refined(scene: Scene, pipeline: Pipeline, times: int) -> Pipeline:
     if pipeline.opacity.rule == "as-is":
         assert scene.transfer is not None
         exact = pipeline.with_switches(rays={"format": "exact"})
-        step = _one(prepare(scene, exact, EXACT).paths.world_step, pipeline)
+        step = float(prepare(scene, exact, EXACT).paths.world_step.mean())
         opacity = {"rule": "corrected", "factor": scene.transfer.unit_distance / step}
     return pipeline.with_switches(stepping=changes, opacity=opacity)
 
