@@ -48,7 +48,7 @@ def blended_codes(source: Bytes, behind: Bytes, blend: str) -> Bytes:
     back = _product(two, 255 - alpha)
     if blend == "additive-alpha":
         front[:, 3], back[:, 3] = one[:, 3], two[:, 3]
-    return np.minimum(front + back, 255).astype(np.uint8)
+    return np.asarray(np.minimum(front + back, 255), np.uint8)
 
 
 def _product(one: Integers, other: Integers) -> Integers:
