@@ -49,6 +49,7 @@ if TYPE_CHECKING:
         write_image,
     )
     from volref.oracle.metrics import Comparison, compare
+    from volref.oracle.tracing import trace
     from volref.phantoms.transfer import dbz_transfer
     from volref.planning import Plan, plan
     from volref.scene import (
@@ -70,6 +71,7 @@ if TYPE_CHECKING:
     from volref.scene.slices import axis_slice, oblique_slice
     from volref.stages.jitter import jitter_images
     from volref.tonemap import tone_map
+    from volref.traces import Trace
     from volref.truth.jittered import render_jittered
     from volref.truth.radar.resampling import resample_radar
     from volref.truth.radar.slices import RadarMap, cappi, ppi
@@ -77,8 +79,6 @@ if TYPE_CHECKING:
     from volref.truth.result import Render
     from volref.truth.series import render_series
     from volref.truth.supersampling import supersample
-    from volref.traces import Trace
-    from volref.truth.tracing import trace
     from volref.truth.verification import Verification, verify
 
 __version__ = "0.1.0"
@@ -164,6 +164,7 @@ _HOMES = {
     "volref.emulation.result": ("Emulation",),
     "volref.errors": ("FormatError", "SceneError"),
     "volref.oracle.metrics": ("Comparison", "compare"),
+    "volref.oracle.tracing": ("trace",),
     "volref.phantoms.transfer": ("dbz_transfer",),
     "volref.planning": ("Plan", "plan"),
     "volref.scene": (
@@ -193,7 +194,6 @@ _HOMES = {
     "volref.truth.supersampling": ("supersample",),
     "volref.truth.result": ("Render",),
     "volref.traces": ("Trace",),
-    "volref.truth.tracing": ("trace",),
     "volref.truth.verification": ("Verification", "verify"),
 }
 _HOME = dict.fromkeys(__all__, "volref.io") | {name: home for home, names in _HOMES.items() for name in names}
