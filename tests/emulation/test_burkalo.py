@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.oracles import burkalo as oracle
-from volref import Camera, Scene, SceneError, TransferFunction, Volume, emulate, render
+from volref import Camera, Mesh, Scene, SceneError, TransferFunction, Volume, emulate, render
 from volref.emulation.catalogue import named
 from volref.emulation.device import Device
 from volref.emulation.marching import march
@@ -111,6 +111,16 @@ def test_the_focal_length_and_the_aspect_make_the_rays_of_the_camera():
     # The eye is some two boxes away: float32 keeps 2e-7 there, and t times v doubles it.
     for one, other in ((focal.entry, eye.entry), (focal.exit, eye.exit)):
         np.testing.assert_allclose(one, other, rtol=0, atol=2e-6)
+
+
+def test_rays_of_the_focal_length_end_at_a_mesh_as_those_of_the_eye_do():
+    plate = Mesh([(-90, 4, -99), (90, -9, -99), (90, 5, 99), (-90, 9, 99)], [(0, 1, 2), (0, 2, 3)], (1, 1, 1))
+    scene = dataclasses.replace(specimen(), meshes=(plate,))
+    rules = (raw(rays={"direction": rule}, meshes={"kind": "distance"}) for rule in ("focal", "eye"))
+    focal, eye = (prepare(scene, rule, Device()).ends.exit for rule in rules)
+    whole = prepare(specimen(), raw(), Device()).ends.exit
+    np.testing.assert_allclose(focal, eye, rtol=0, atol=2e-6)  # as above
+    assert (np.abs(focal - whole).max(axis=0) > 0.1).any()
 
 
 def test_without_the_aspect_a_wide_canvas_shows_the_square_image_stretched():

@@ -30,9 +30,7 @@ def focal_ends(scene: Scene, rule: str, box: Box, device: Device, surface: Float
     """
     camera, kind = scene.camera, device.control_type
     if camera.is_parallel:
-        message = (
-            f"camera must be a perspective one for pipeline.rays.direction {rule!r}, got a parallel "
-        )
+        message = f"camera must be a perspective one for pipeline.rays.direction {rule!r}, got a parallel "
         raise SceneError(message + "one; use a pipeline with 'eye'")
     eye = transform_points(box.texture_from_world, camera.world_from_view[:3, 3]).astype(kind)
     turn = (box.texture_from_world @ camera.world_from_view)[:3, :3].astype(kind)
