@@ -41,7 +41,7 @@ class Case:
 
 
 def suits(system: System, scene: str) -> bool:
-    return EXAMPLES[scene].needs <= system.suits
+    return system.only <= EXAMPLES[scene].needs <= system.suits
 
 
 def cases() -> list[Case]:

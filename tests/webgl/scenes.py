@@ -1,8 +1,8 @@
 """Small scenes on which emulations are held to real WebGL, by name, each with what is special about it.
 
 `needs` are the kinds of scenes that only some systems draw: "mesh" (opaque meshes), "parallel" (rays without
-an eye), "lit" (lights and a material), "gradients" (a table of the gradient too).  A scene without any suits
-every system.
+an eye), "lit" (lights and a material), "gradients" (a table of the gradient too), "radar" (a radar in place
+of a volume, see `radar_scenes.py`).  A scene without any suits every system, but for those of radars only.
 """
 
 from collections.abc import Callable
@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tests.webgl import radar_scenes
 from volref import Camera, Light, Material, Mesh, Scene, TransferFunction, TransferFunction2D, Volume
 from volref.phantoms.meshes import box_mesh, sphere_mesh
 
@@ -186,6 +187,7 @@ def edges():
 
 
 MESH = frozenset({"mesh"})
+RADAR = frozenset({"radar"})
 
 EXAMPLES = {
     "oblique": Example(oblique),
@@ -205,4 +207,11 @@ EXAMPLES = {
     "lit by a sun": Example(lit_by_a_sun, frozenset({"lit"})),
     "lit from near": Example(lit_from_near, frozenset({"lit"})),
     "edges": Example(edges, frozenset({"lit", "gradients"})),
+    "radar storm": Example(radar_scenes.storm, RADAR),
+    "radar from above": Example(radar_scenes.from_above, RADAR),
+    "radar near the pole": Example(radar_scenes.near_the_pole, RADAR),
+    "radar horizon": Example(radar_scenes.around_the_horizon, RADAR),
+    "radar uneven": Example(radar_scenes.uneven, RADAR),
+    "radar inside": Example(radar_scenes.inside, RADAR),
+    "radar parallel": Example(radar_scenes.parallel, RADAR | {"parallel"}),
 }

@@ -1,0 +1,79 @@
+"""Seed 001's radar in WebGL 1: front and back coordinates in bytes, then a loop between the two."""
+
+import numpy as np
+
+from tests.webgl.engine import Engine, Job, Pass
+from tests.webgl.systems.common import (
+    BLENDS,
+    IMAGE,
+    System,
+    box_geometry,
+    clip_from_texture,
+    coordinate_passes,
+    drawn,
+    program,
+    table_upload,
+    target_of,
+    volume_upload,
+)
+from volref import Scene
+from volref.emulation.box import box_of
+from volref.emulation.opacity import factor_of
+from volref.emulation.pipeline import Pipeline
+from volref.emulation.uploads import uploads_of
+
+PRINTED = "congote2012-radar-printed"
+
+
+def draw(
+    engine: Engine, scene: Scene, pipeline: Pipeline, *, jitter: None = None, frames: int = 1
+) -> dict[str, np.ndarray]:
+    """Coordinate targets and canvas."""
+    assert jitter is None
+    assert frames == 1
+    uploads = uploads_of(scene, pipeline)
+    grid = uploads.grid
+    assert grid is not None
+    targets, passes = coordinate_passes(scene, pipeline)
+    defines: dict[str, object] = {
+        "STEPS": pipeline.stepping.steps,
+        "OPAQUE_AT": pipeline.stepping.opaque_at,
+        "SWEEPS": len(grid.tilts),
+    }
+    uniforms = {
+        "clip_from_texture": clip_from_texture(scene),
+        "front_coordinates": "front_coordinates",
+        "back_coordinates": "back_coordinates",
+        "sweeps": "sweeps",
+        "table": "table",
+        "tilts": grid.tilts,
+        "gates": (grid.start, grid.span),
+        "opacity_factor": factor_of(scene, pipeline, box_of(scene)),
+        "light_factor": pipeline.lighting.factor,
+    }
+    if pipeline.name == PRINTED:
+        defines["PRINTED"] = 1
+    else:
+        uniforms |= {"turn": grid.turn, "columns": grid.columns, "half_gate": 0.5 / grid.gates}
+    walk = Pass(
+        program("congote.vertex", "congote_radar.fragment", defines),
+        box_geometry(scene),
+        uniforms,
+        IMAGE,
+        scene.background,
+        cull="back",
+        blend=BLENDS[pipeline.output.blend],
+    )
+    job = Job(
+        scene.width,
+        scene.height,
+        (*passes, walk),
+        {"sweeps": volume_upload(uploads, pipeline), "table": table_upload(uploads, pipeline)},
+        targets | {IMAGE: target_of(pipeline.output.format)},
+    )
+    return drawn(engine, job)
+
+
+SYSTEM = System(
+    draw, ("congote2012-radar", PRINTED), frozenset({"radar", "parallel"}), only=frozenset({"radar"})
+)
