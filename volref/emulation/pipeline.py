@@ -19,7 +19,6 @@ import dataclasses
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any, Self
 
 from volref.emulation.groups import (
@@ -33,7 +32,7 @@ from volref.emulation.groups import (
     TableTexture,
     VolumeTexture,
 )
-from volref.emulation.switches import Plain, Switches, checked_keys, switches_of
+from volref.emulation.switches import Plain, Switches, check_head, checked_keys, switches_of
 from volref.errors import SceneError
 from volref.scene.transfer_checks import checked_domain
 
@@ -51,7 +50,8 @@ class Pipeline:
         A short name; one line for people; where the program is published.
     domain
         Values that the textures hold as 0 and 1; None: the first and the last knot of the scene's transfer
-        function, or the domain of its table.
+        function.  Of one from a table with texel centres these lie half an entry inside the table's domain:
+        give the domain here then.
     rays, stepping, volume, table, opacity, lighting, accumulation, meshes, output
         The decisions; see the head of this module.
 
@@ -132,13 +132,11 @@ class Pipeline:
         SceneError
             If it is of another format or version, or a switch is unknown or breaks its rule.
         """
+        if isinstance(document, Mapping) and "unknown" in document:
+            raise SceneError(_open_switches(document["unknown"]))
         allowed = ["format", "version", "name", "title", "source", "domain", *GROUPS]
         values = checked_keys("pipeline", document, allowed)
-        for key, wanted in (("format", FORMAT), ("version", FORMAT_VERSION)):
-            got = values.pop(key, None)
-            if got != wanted:
-                message = f"pipeline.{key} must be {wanted!r}, got {got!r}; this is another kind of file"
-                raise SceneError(message)
+        check_head("pipeline", values, FORMAT, FORMAT_VERSION)
         for name, kind in GROUPS.items():
             if name in values:
                 values[name] = kind.from_dict(f"pipeline.{name}", values[name])
@@ -172,12 +170,8 @@ GROUPS: dict[str, type[Switches]] = {
 }
 
 
-def load_pipeline(path: str | Path) -> Pipeline:
-    """Return the pipeline in a JSON file.
-
-    Raises
-    ------
-    SceneError
-        If the file is not one; see `Pipeline.from_dict`.
-    """
-    return Pipeline.from_json(Path(path).read_text(encoding="utf-8"))
+def _open_switches(unknown: object) -> str:
+    """Return why a set of pipelines is not one."""
+    names = ", ".join(map(str, unknown)) if isinstance(unknown, Mapping) else repr(unknown)
+    message = f"pipeline.unknown must not be there in one pipeline, got the open switches {names or 'none'}; "
+    return message + "settle them, or load the set with load_candidates"
