@@ -42,9 +42,9 @@ class System:
 
     draw: (engine, scene, pipeline, *, jitter=None, frames=1) -> every target by the emulation's own names,
     (H, W, channels), row 0 at the top, uint8 or float32.  pipelines: names in the catalogue.  suits: kinds
-    of scenes (see `scenes.py`) that it draws beside plain ones; only: kinds that a scene must be of.  p99: what 99 of 100
-    pixels of a float image are within.  jitter: whether it is given start offsets; steady: the same all over
-    a frame.  frames: how many it averages in the tests.
+    of scenes (see `scenes.py`) that it draws beside plain ones; only: kinds that a scene must be of.  p99:
+    what 99 of 100 pixels of a float image are within.  jitter: whether it is given start offsets; steady: the
+    same all over a frame.  frames: how many it averages in the tests.
     """
 
     draw: Callable[..., dict[str, np.ndarray]]
