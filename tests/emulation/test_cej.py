@@ -14,7 +14,7 @@ from tests.oracles.cej import Pixels, gradient_bytes
 from volref.emulation.box import box_of
 from volref.emulation.canvas import mean_of_frames
 from volref.emulation.catalogue import named
-from volref.emulation.gradient_volume import unpacked, with_gradient
+from volref.emulation.gradient_volume import gradient_weights, unpacked, with_gradient
 from volref.emulation.groups import Lighting, Output
 from volref.emulation.noise import hash_jitter
 from volref.emulation.opacity import factor_of
@@ -109,6 +109,15 @@ def test_gradients_are_unnormalised_the_steepest_edge_has_the_length_16_over_27(
     gradient, length = unpacked(found[:, None], WORKING.lighting)
     assert_allclose(length, 16 / 27, rtol=1e-14)  # a few ulp
     assert gradient[0, 0] < 0  # downhill
+
+
+def test_no_field_has_a_gradient_longer_than_0_679():
+    """Along a direction the longest is that of the field that is 1 where the weights along it are above 0."""
+    weights = gradient_weights(WORKING.lighting).reshape(3, 27) / 27
+    directions = np.random.default_rng(0).normal(size=(3, 50_000))
+    directions /= np.linalg.norm(directions, axis=0)
+    longest = np.maximum(weights.T @ directions, 0).sum(axis=0).max()
+    assert longest == pytest.approx(0.6789, abs=1e-4)  # 50 000 directions are 0.01 apart, and it is a maximum
 
 
 def test_a_table_of_the_gradient_means_magnitudes_of_the_world():
