@@ -16,10 +16,12 @@ import importlib
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from volref.emulation.candidates import Candidates, load_candidates
     from volref.emulation.catalogue import pipelines
     from volref.emulation.device import Device
+    from volref.emulation.documents import load_device, load_pipeline, pipeline_schema
     from volref.emulation.passes import emulate
-    from volref.emulation.pipeline import Pipeline, load_pipeline
+    from volref.emulation.pipeline import Pipeline
     from volref.emulation.result import Emulation
     from volref.errors import FormatError, SceneError
     from volref.io import (
@@ -86,6 +88,7 @@ __version__ = "0.1.0"
 __all__ = [
     "AtlasLayout",
     "Camera",
+    "Candidates",
     "Comparison",
     "Device",
     "Emulation",
@@ -120,6 +123,8 @@ __all__ = [
     "emulate",
     "jitter_images",
     "load_camera",
+    "load_candidates",
+    "load_device",
     "load_jitter",
     "load_mesh",
     "load_meshes",
@@ -132,6 +137,7 @@ __all__ = [
     "load_transfer",
     "load_volume",
     "oblique_slice",
+    "pipeline_schema",
     "pipelines",
     "plan",
     "ppi",
@@ -160,7 +166,9 @@ _HOMES = {
     "volref.emulation.catalogue": ("pipelines",),
     "volref.emulation.device": ("Device",),
     "volref.emulation.passes": ("emulate",),
-    "volref.emulation.pipeline": ("Pipeline", "load_pipeline"),
+    "volref.emulation.candidates": ("Candidates", "load_candidates"),
+    "volref.emulation.documents": ("load_device", "load_pipeline", "pipeline_schema"),
+    "volref.emulation.pipeline": ("Pipeline",),
     "volref.emulation.result": ("Emulation",),
     "volref.errors": ("FormatError", "SceneError"),
     "volref.oracle.metrics": ("Comparison", "compare"),

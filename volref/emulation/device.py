@@ -12,6 +12,9 @@ import numpy as np
 from volref.emulation.switches import Switches, Whole, Word
 from volref.errors import SceneError
 
+FORMAT = "volref-device"
+FORMAT_VERSION = 1
+
 ARITHMETIC = {
     "float64": "64 bits, what no GPU has",
     "float32": "32 bits, highp",
@@ -133,7 +136,7 @@ class Device(Switches):
 
     def to_json(self) -> str:
         """Return the device as JSON text."""
-        return json.dumps({"format": "volref-device", "version": 1, **self.as_dict()}, indent=2) + "\n"
+        return json.dumps({"format": FORMAT, "version": FORMAT_VERSION, **self.as_dict()}, indent=2) + "\n"
 
 
 _TYPES: dict[str, type[np.floating[Any]]] = {
@@ -153,6 +156,7 @@ PRESETS: dict[str, Device] = {
             subpixel_bits=4,
             constant_divisor="multiplied",
             angles="swiftshader",
+            detail="bits",
         ),
         Device(
             "llvmpipe",

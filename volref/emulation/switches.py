@@ -56,6 +56,9 @@ class Real:
 
     def checked(self, name: str, value: object) -> Plain:
         """Return the number, or refuse it."""
+        if isinstance(value, bool | str):
+            message = f"{name} must be a number, got {value!r}; give one finite number"
+            raise SceneError(message)
         return number(name, value, low=self.low, high=self.high)
 
 
@@ -131,6 +134,21 @@ def checked_keys(name: str, values: object, allowed: list[str]) -> dict[str, Any
         message = f"{name} must have switches it knows, got {strange[0]!r}; use one of {', '.join(allowed)}"
         raise SceneError(message)
     return dict(values)
+
+
+def check_head(name: str, values: dict[str, Any], kind: str, version: int) -> None:
+    """Take "format" and "version" out of a document, and refuse it if they are others.
+
+    Raises
+    ------
+    SceneError
+        If they are not those.
+    """
+    for key, wanted in (("format", kind), ("version", version)):
+        got = values.pop(key, None)
+        if type(got) is not type(wanted) or got != wanted:
+            message = f"{name}.{key} must be {wanted!r}, got {got!r}; this is another kind of file"
+            raise SceneError(message)
 
 
 def group_name(kind: type) -> str:
