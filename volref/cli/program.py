@@ -12,7 +12,19 @@ import sys
 from collections.abc import Sequence
 from typing import NoReturn
 
-from volref.cli import compare, convert, demo, info, plan, precision, render, report, stability, trace
+from volref.cli import (
+    compare,
+    convert,
+    demo,
+    emulate,
+    info,
+    plan,
+    precision,
+    render,
+    report,
+    stability,
+    trace,
+)
 from volref.cli.output import refuse
 from volref.cli.verb import BAD_USE, GOOD, example_lines
 from volref.errors import FormatError, SceneError
@@ -22,6 +34,7 @@ VERBS = (
     render.VERB,
     plan.VERB,
     trace.VERB,
+    emulate.VERB,
     compare.VERB,
     info.VERB,
     convert.VERB,
