@@ -68,11 +68,11 @@ def faces(scene: Scene, box: Box, device: Device, cull: str) -> Fragments:
 def _two_passes(scene: Scene, pipeline: Pipeline, box: Box, device: Device) -> tuple[Ends, dict[str, Floats]]:
     front = faces(scene, box, device, "back")
     targets = {"back_coordinates": _target(faces(scene, box, device, "front"), scene, pipeline, device)}
-    exits = _read(targets["back_coordinates"], front, pipeline, box, device)
+    exits = read_target(targets["back_coordinates"], front, pipeline, box, device)
     entries = front.varyings.astype(device.control_type)
     if pipeline.rays.front == "target":
         targets = {"front_coordinates": _target(front, scene, pipeline, device)} | targets
-        entries = _read(targets["front_coordinates"], front, pipeline, box, device)
+        entries = read_target(targets["front_coordinates"], front, pipeline, box, device)
     else:
         # No target of the program's own: what a frame capture shows when the varying is drawn.
         shown = pipeline.with_switches(rays={"format": "float"})
@@ -98,7 +98,7 @@ def _target(fragments: Fragments, scene: Scene, pipeline: Pipeline, device: Devi
     return target.reshape(scene.height, scene.width, 3)
 
 
-def _read(target: Floats, fragments: Fragments, pipeline: Pipeline, box: Box, device: Device) -> Floats:
+def read_target(target: Floats, fragments: Fragments, pipeline: Pipeline, box: Box, device: Device) -> Floats:
     """Return what fragments read of a target at their own place, (clip xy / clip w + 1) / 2.
 
     That place is a varying of the snapped triangle, which the clip positions of its corners are not: it lies

@@ -11,6 +11,7 @@ import numpy as np
 from volref.arrays import Floats
 from volref.emulation.device import Device
 from volref.emulation.gradient_volume import has_gradient_volume, unpacked
+from volref.emulation.mipmaps import classified_in_quads, levels_of
 from volref.emulation.pipeline import Pipeline
 from volref.emulation.radar_image import PolarGrid
 from volref.emulation.slices import SlicePair, slice_pair
@@ -43,12 +44,16 @@ class Textures:
     size: tuple[int, int, int]
     tiles: tuple[int, int]
     grid: PolarGrid | None = None
+    levels: tuple[Texture, ...] = ()
 
 
 def textures_of(uploads: Uploads, pipeline: Pipeline, device: Device) -> Textures:
     """Return the textures of a program as a device samples them."""
     volume, table = (make(uploads, pipeline, device) for make in (volume_texture, table_texture))
-    return Textures(pipeline, device, volume, table, uploads.size, uploads.tiles, uploads.grid)
+    levels: tuple[Texture, ...] = ()
+    if pipeline.table.filter == "linear-mipmap":
+        levels = levels_of(table, narrow=uploads.table.dtype == np.uint8)
+    return Textures(pipeline, device, volume, table, uploads.size, uploads.tiles, uploads.grid, levels)
 
 
 def look_up(textures: Textures, position: Floats, work: Workspace) -> Found:
@@ -83,6 +88,8 @@ def look_up(textures: Textures, position: Floats, work: Workspace) -> Found:
 def classified(textures: Textures, value: Floats, work: Workspace, magnitude: Floats | None = None) -> Floats:
     """Return the table's colour (4, n) of values (n,), and of |g| (n,) as its v; without it v is 1/2."""
     place = table_place(textures.pipeline.table, value)
+    if textures.levels:
+        return classified_in_quads(textures.levels, place, textures.device, work)
     if magnitude is not None:
         return fetch(textures.table, (place, magnitude), work)
     half = work.get("half", len(place), place.dtype)

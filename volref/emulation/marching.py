@@ -16,6 +16,7 @@ from volref.emulation.groups import Stepping
 from volref.emulation.lookup import Found, Textures, look_up, mix
 from volref.emulation.opacity import OpacityRule
 from volref.emulation.paths import Paths
+from volref.errors import SceneError
 from volref.workspace import Workspace
 
 # Rays walked together: fewer cost more calls than arithmetic, more leave the second-level cache.
@@ -99,10 +100,20 @@ class _Walk:
     weighted: Floats
     depth: Floats
     over: Booleans
+    quads: bool
 
 
 def march(program: Program, observe: Observer | None = None, rays: Indices | None = None) -> Marched:
-    """Return what the loop accumulates along all rays, or along some: that of the others stays 0."""
+    """Return what the loop accumulates along all rays, or along some: that of the others stays 0.
+
+    Raises
+    ------
+    SceneError
+        If some are chosen, and the table has mip levels, for which a ray needs its neighbours.
+    """
+    if rays is not None and program.textures.levels:
+        message = "pipeline.table.filter must be 'linear' or 'nearest' for single rays, got 'linear-mipmap'; "
+        raise SceneError(message + "choose one to look into a pixel")
     chosen = np.arange(len(program.offset)) if rays is None else rays
     count, kind = len(program.offset), program.textures.device.values_type
     color, alpha, weighted = np.zeros((3, count), kind), np.zeros(count, kind), np.zeros(count, kind)
@@ -134,6 +145,8 @@ def _run(program: Program, rays: Indices, result: Marched, work: Workspace, obse
         _advance(stepping, walk)
         if not _left(walk, _ended_after(stepping, walk, position), number + 1, result):
             return
+        if walk.quads:
+            walk.position = np.where(walk.over, position, walk.position)
     _left(walk, np.ones_like(walk.over), stepping.cap or LONGEST_LOOP, result)
 
 
@@ -151,7 +164,8 @@ def _start(program: Program, rays: Indices) -> _Walk:
         walked = paths.length
     zeros = (np.zeros((3, count), kind), np.zeros(count, kind), np.zeros(count, kind))
     depth = walked if program.cut is None else program.cut.depth[rays]
-    return _Walk(rays, paths, offset, position, walked, *zeros, depth, np.zeros(count, np.bool_))
+    over, quads = np.zeros(count, np.bool_), bool(program.textures.levels)
+    return _Walk(rays, paths, offset, position, walked, *zeros, depth, over, quads)
 
 
 def _left(walk: _Walk, ended: Booleans, samples: int, result: Marched) -> bool:
@@ -163,7 +177,7 @@ def _left(walk: _Walk, ended: Booleans, samples: int, result: Marched) -> bool:
         share = np.count_nonzero(walk.over) / len(walk.over)
         if share == 1.0:
             return False
-        if share > MOST_OVER:
+        if share > MOST_OVER and not walk.quads:
             _drop(walk)
     return True
 

@@ -5,6 +5,7 @@ uploads --> coordinate targets --> ends of rays --> paths --> the loop --> fragm
             mesh targets ---------------+-------------------------+-------------------------------+
 """
 
+import dataclasses
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -36,6 +37,7 @@ from volref.emulation.meshes import Surfaces, check_meshes, distances, surfaces_
 from volref.emulation.opacity import OpacityRule, opacity_rule
 from volref.emulation.paths import Ends, Paths, paths_of
 from volref.emulation.pipeline import Pipeline
+from volref.emulation.quads import rays_in_quads
 from volref.emulation.radar_image import check_spherical, is_spherical
 from volref.emulation.result import Emulation
 from volref.emulation.shading import check_gradients, shader_of
@@ -91,7 +93,7 @@ def emulate(
     passes = dict(drawing.targets)
     mean = cleared(scene, program.output, machine)
     for number, offset in enumerate(offsets, start=1):
-        marched = march(drawing.program(offset))
+        marched = march_frame(drawing, offset)
         last, mean = last_targets(drawing, marched, number, mean)
     passes |= last
     size = scene.height, scene.width
@@ -160,6 +162,26 @@ def prepare(scene: Scene, pipeline: Pipeline, device: Device) -> Drawing:
     shade = shader_of(scene, textures, box, ends)
     ready = textures, ends, paths, rule, targets, surfaces, distance, cut, shade
     return Drawing(scene, pipeline, device, box, uploads, *ready)
+
+
+def march_frame(drawing: Drawing, offset: Floats) -> Marched:
+    """Return what the loop accumulates along the rays of a drawing, whose start offsets are (H * W,).
+
+    Where the table has mip levels, rays are walked with their neighbours.
+    """
+    if not drawing.textures.levels:
+        return march(drawing.program(offset))
+    scene, pipeline, box, device = drawing.scene, drawing.pipeline, drawing.box, drawing.device
+    ends, drawn_too = rays_in_quads(scene, pipeline, box, device, drawing.targets)
+    paths = paths_of(ends, scene, pipeline, box, device)
+    rule = opacity_rule(scene, pipeline, box, paths, device)
+    lanes = dataclasses.replace(drawing, ends=ends, paths=paths, rule=rule)
+    marched = march(lanes.program(offset))
+    lane_of = np.zeros(scene.height * scene.width, np.intp)
+    lane_of[ends.pixel[drawn_too]] = np.flatnonzero(drawn_too)
+    lane = lane_of[drawing.ends.pixel]
+    color, alpha, weighted, samples, hit = marched
+    return Marched(color[:, lane], alpha[lane], weighted[lane], samples[lane], hit[lane])
 
 
 def last_targets(

@@ -79,11 +79,15 @@ def atlas_of(uploads: Uploads, pipeline: Pipeline) -> Texture:
 
 
 def canvas_of(uploads: Uploads, pipeline: Pipeline) -> Texture:
-    """Canvas of 20 equal rows, the last of them empty: `fillRect` ends one short of both sides."""
-    canvas = np.repeat(uploads.table[:1], 20, axis=0)
+    """Canvas of 20 equal rows, the last of them empty: `fillRect` ends one short of both sides.
+
+    WebGL 1 has mip levels for powers of two only: three.js then makes 16 rows of the 20, here all filled.
+    """
+    if pipeline.table.filter == "linear-mipmap":
+        return Texture(np.repeat(uploads.table, 16, axis=0), "rgba8", "linear-mipmap-linear")
+    canvas = np.repeat(uploads.table, 20, axis=0)
     canvas[-1] = 0
-    kind = pipeline.table.filter.replace("linear-mipmap", "linear-mipmap-linear")
-    return Texture(canvas, "rgba8", kind, flip_y=True)
+    return Texture(canvas, "rgba8", pipeline.table.filter, flip_y=True)
 
 
 SYSTEM = System(draw, ("barbagallo", "barbagallo-article"), frozenset({"parallel"}), p99=1e-3)
