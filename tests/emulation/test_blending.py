@@ -30,6 +30,14 @@ def test_a_product_is_never_further_off():
     assert 0.5 < np.abs(off).max() <= 2 / 3
 
 
+def test_one_times_a_half_is_one_and_255_leaves_what_it_multiplies():
+    nothing = np.zeros((1, 4), np.uint8)
+    half = blended_codes(np.array([[1, 2, 3, 128]], np.uint8), nothing, "straight")
+    assert half.tolist() == [[1, 1, 2, 64]]
+    whole = np.array([[k, k, k, 255] for k in range(256)], np.uint8)
+    np.testing.assert_array_equal(blended_codes(whole, np.repeat(nothing, 256, axis=0), "straight"), whole)
+
+
 @given(source=codes, behind=codes)
 def test_an_opaque_fragment_replaces_and_a_transparent_one_leaves(source, behind):
     source[:, 3] = 255

@@ -131,8 +131,9 @@ def test_the_near_plane_cuts_the_box_and_the_far_plane_does_not():
     assert alphas["far"] == pytest.approx(alphas["whole"], rel=1e-6)
 
 
-def test_rays_are_the_same_for_either_range_of_clip_z():
-    one, other = (emulate(block(clip_z=clip_z), FLOATS) for clip_z in ("-1..1", "0..1"))
+def test_rays_begin_at_the_same_near_plane_for_either_range_of_clip_z():
+    faint = FLOATS.with_switches(opacity={"factor": 0.1})
+    one, other = (emulate(block(clip_z=clip_z, near=2.5), faint) for clip_z in ("-1..1", "0..1"))
     np.testing.assert_array_equal(one.rgba, other.rgba)
 
 
@@ -158,16 +159,17 @@ def test_light_of_the_table_is_decoded_before_it_is_filtered():
     assert emulate(scene, pipeline).passes["frame"][0, 0, 0] == pytest.approx(128 / 255 * 2 - 0.5, abs=1e-6)
 
 
-def test_an_alpha_above_one_divides_the_colour():
+@pytest.mark.parametrize("opacity", [1.5, 3.0])
+def test_an_alpha_above_one_divides_the_colour(opacity):
     transfer = TransferFunction.from_opacity([0, 255], [(0.25, 0.5, 0.75)] * 2, [1.0, 1.0])
-    # A step's opacity is 3: the first sample alone makes A = 3 and C = 3 c.
-    pipeline = FLOATS.with_switches(stepping={"steps": 1}, opacity={"factor": 3.0}, table={"srgb": False})
+    # The first sample alone makes A = opacity and C = A c.
+    pipeline = FLOATS.with_switches(stepping={"steps": 1}, opacity={"factor": opacity}, table={"srgb": False})
     frame = emulate(block(255, transfer), pipeline).passes["frame"][0, 0]
     # Colours are bytes of the table.
     np.testing.assert_allclose(frame, [64 / 255, 128 / 255, 191 / 255, 1.0], rtol=0, atol=1e-7)
     without = pipeline.with_switches(accumulation={"normalize": False})
     over = emulate(block(255, transfer), without).passes["frame"][0, 0]
-    np.testing.assert_allclose(over[:3], 3 * frame[:3], rtol=1e-6)
+    np.testing.assert_allclose(over[:3], opacity * frame[:3], rtol=1e-6)
 
 
 def test_the_mean_of_frames_is_stored_in_bytes_after_each_of_them():
