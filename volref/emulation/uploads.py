@@ -104,7 +104,7 @@ def domain_of(scene: Scene, pipeline: Pipeline) -> tuple[float, float]:
     """Return the values that the textures hold as 0 and 1.
 
     The pipeline's; else those of the outer knots of the transfer function, where they differ; else the least
-    and the greatest of the volume.
+    and the greatest of the volume; where it has one value only, that and 1 more, or the next float64.
     """
     if pipeline.domain is not None:
         return pipeline.domain
@@ -115,7 +115,7 @@ def domain_of(scene: Scene, pipeline: Pipeline) -> tuple[float, float]:
     for low, high in ((scene.transfer.values[0], scene.transfer.values[-1]), scene.volume.value_bounds):
         if low < high:
             return float(low), float(high)
-    return float(low), float(low) + 1.0
+    return float(low), float(max(low + 1.0, np.nextafter(low, np.inf)))
 
 
 def baked_table(scene: Scene, pipeline: Pipeline, domain: tuple[float, float]) -> Floats:
