@@ -182,7 +182,7 @@ def edges():
     volume = field((20, 22, 18))
     value, magnitude = np.meshgrid(np.arange(16) / 15, np.arange(8) / 7)
     colors = [value, magnitude, 1 - value, 0.6 * value * np.sqrt(magnitude)]
-    look = TransferFunction2D(np.stack(colors, axis=-1), (0, 255), (0, 80), 2.0)
+    look = TransferFunction2D(np.stack(colors, axis=-1), (0, 255), (0, 200), 2.0)
     return scene(volume, towards(volume, (0.7, 0.9, -0.4)), look, lights=(Light.ambient((0.9, 0.8, 0.7)),))
 
 
