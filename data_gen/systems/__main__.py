@@ -74,7 +74,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("names", nargs="*", metavar="PAGE", help=f"of {', '.join(PAGES)}; all if none")
     parser.add_argument("--docs", type=Path, default=Path("docs"), help="folder to write in (docs)")
-    parser.add_argument("--pixels", type=int, default=180, help="side of a picture (180)")
+    parser.add_argument("--pixels", type=int, default=150, help="side of a picture (150)")
     return parser
 
 

@@ -39,14 +39,18 @@ class Distance:
 def demo_scene(demo: Path, pixels: int) -> vr.Scene:
     """Return the head of the demo, its table given by opacities, over opaque black."""
     scene = vr.load_scene(demo)
-    transfer = scene.transfer
-    assert isinstance(transfer, vr.TransferFunction)
-    table = vr.TransferFunction(
-        transfer.values, transfer.colors, transfer.extinction, unit_distance=UNIT_DISTANCE
-    )
+    table = _table(scene, UNIT_DISTANCE)
     return dataclasses.replace(
         scene, transfer=table, width=pixels, height=pixels, meshes=(), background=(0.0, 0.0, 0.0, 1.0)
     )
+
+
+def _table(scene: vr.Scene, unit_distance: float) -> vr.TransferFunction:
+    """Return the scene's transfer function, whose opacities are meant for another distance."""
+    transfer = scene.transfer
+    assert isinstance(transfer, vr.TransferFunction)
+    extinction = transfer.extinction
+    return vr.TransferFunction(transfer.values, transfer.colors, extinction, unit_distance=unit_distance)
 
 
 def case_of(name: str, scene: vr.Scene, mesh: vr.Mesh) -> Case:
@@ -55,11 +59,11 @@ def case_of(name: str, scene: vr.Scene, mesh: vr.Mesh) -> Case:
     if pipeline.meshes.kind != "none":
         scene = dataclasses.replace(scene, meshes=(mesh,))
     if pipeline.opacity.rule == "as-is":
-        # What a user does at the page's slider: as much opacity as a step of this length has.
+        # A table whose opacities are meant for a step of the program, as its user would make it.
         assert isinstance(scene.volume, vr.Volume)
         side = np.mean([n * s for n, s in zip(scene.volume.size, scene.volume.spacing, strict=True)])
         step = float(side) * (pipeline.stepping.length or 1 / pipeline.stepping.steps)
-        pipeline = pipeline.with_switches(opacity={"factor": step / UNIT_DISTANCE})
+        scene = dataclasses.replace(scene, transfer=_table(scene, step))
     return Case(pipeline, scene)
 
 
@@ -77,13 +81,13 @@ def distances(case: Case, truth: Floats) -> dict[str, Distance]:
 
 
 def distance(image: Floats, truth: Floats) -> Distance:
-    """Return how far an image is from the truth.
+    """Return how far the colours of an image, as a screen shows them, are from the truth's.
 
     Examples
     --------
-    >>> distance(np.array([[[0.1, 0.0, 0.0, 1.0]]]), np.array([[[0.0, 0.0, 0.0, 1.0]]]))
-    Distance(mean=6.375, p99=24.735, most=25.5)
+    >>> distance(np.array([[[0.1, 0.0, 9.0, 0.0]]]), np.array([[[0.0, 0.0, 1.0, 1.0]]]))
+    Distance(mean=8.5, p99=24.99, most=25.5)
     """
-    apart = 255 * np.abs(np.nan_to_num(image) - truth)
+    apart = 255 * np.abs(np.clip(np.nan_to_num(image[..., :3]), 0.0, 1.0) - truth[..., :3])
     mean, p99, most = apart.mean(), np.quantile(apart, 0.99), apart.max()
     return Distance(float(round(mean, 3)), float(round(p99, 3)), float(round(most, 3)))

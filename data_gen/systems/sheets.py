@@ -26,6 +26,9 @@ PAGES: Mapping[str, tuple[str, ...]] = {
 # By what differences are multiplied to be seen.
 STRONGER = 8
 
+# A target of distances is cleared to more than this.
+CLEARED = 1e20
+
 # From ahead on the left and above, for what answers lights.
 LIGHTS = (vr.Light.ambient((0.3, 0.3, 0.3)), vr.Light.directional((-1.0, -0.6, -0.9), color=(1.2, 1.2, 1.2)))
 
@@ -54,12 +57,12 @@ def light_of(case: Case) -> vr.Emulation:
 
 
 def shown(target: Floats) -> Floats:
-    """Return a target (H, W, channels) as colours: one channel as grey, from its least to its greatest."""
+    """Return a target (H, W, channels) as colours: one channel as grey, white where it is least."""
     if target.shape[-1] > 1:
         return target
-    finite = np.where(np.isfinite(target), target, np.nan)
+    finite = np.where(np.abs(target) < CLEARED, target, np.nan)
     low, high = np.nanmin(finite), np.nanmax(finite)
-    grey = np.nan_to_num((finite - low) / max(high - low, 1e-30))
+    grey = np.nan_to_num((high - finite) / max(high - low, 1e-30))
     return np.repeat(grey, 3, axis=-1)
 
 

@@ -30,6 +30,6 @@ def test_the_table_has_a_row_for_each_program():
     assert "| `texture3d` | 255.00 / 255.0 / 255 | 255.00 / 255.0 / 255 | 255.00 / 255.0 / 255 |" in text
 
 
-def test_a_target_of_one_channel_is_shown_from_its_least_to_its_greatest():
+def test_a_target_of_one_channel_is_white_where_it_is_least():
     target = np.array([[[2.0], [np.inf], [4.0]]])
-    assert shown(target)[0, :, 1].tolist() == [0.0, 0.0, 1.0]
+    assert shown(target)[0, :, 1].tolist() == [1.0, 0.0, 0.0]

@@ -21,10 +21,12 @@ from volref.emulation.opacity import factor_of
 from volref.emulation.passes import prepare
 from volref.emulation.paths import world_step_of
 from volref.emulation.pipeline import Pipeline
+from volref.emulation.radar_image import polar_image, uploaded_radar
 from volref.emulation.switches import Plain
 from volref.emulation.uploads import Uploads, table_texture, uploads_of
 from volref.errors import SceneError
 from volref.formats import stored
+from volref.scene.radar import RadarVolume
 from volref.scene.scene import Scene
 from volref.scene.transfer import TransferFunction
 from volref.scene.volume import Volume
@@ -37,7 +39,8 @@ def limit_scene(scene: Scene, pipeline: Pipeline) -> Scene:
 
     Slices lie where the program's rule puts them.  At the border of the box a program may do what no scene
     does (bleed into a neighbour tile, blend with an empty slice): the limit holds for volumes that are
-    transparent in their outer slices, rows and columns.
+    transparent in their outer slices, rows and columns.  Around a radar it takes the least value: that must
+    be transparent.
 
     Raises
     ------
@@ -90,6 +93,11 @@ def refined(scene: Scene, pipeline: Pipeline, times: int) -> Pipeline:
     opacity: dict[str, Plain] = {"factor": factor_of(scene, pipeline, box_of(scene))}
     if pipeline.opacity.rule == "as-is":
         assert scene.transfer is not None
+        if opacity["factor"] != 1.0:
+            message = (
+                "pipeline.opacity.factor must be 1 for a step to be refined of an opacity taken as it is, "
+            )
+            raise SceneError(message + f"got {opacity['factor']:g}; put the factor into the table")
         exact = pipeline.with_switches(rays={"format": "exact"})
         step = float(prepare(scene, exact, EXACT).paths.world_step.mean())
         opacity = {"rule": "corrected", "factor": scene.transfer.unit_distance / step}
@@ -105,6 +113,9 @@ def _refuse_printed(scene: Scene, pipeline: Pipeline) -> None:
         "the tiles of the atlas are mixed up": volume.tile_row != "columns"
         or volume.second_column != "fract",
         "slices are mixed by x": volume.between == "x",
+        "a radar is looked up as eq. 18 to 20 are printed": volume.geometry == "spherical-printed",
+        "a radar has a seam at its first azimuth": volume.geometry == "spherical"
+        and volume.seam == "clamped",
         "slices are not interpolated": volume.between == "none" or volume.filter == "nearest",
         "the table is not interpolated": table.filter == "nearest",
         "opacity is weighted by the gradient": pipeline.opacity.by_gradient > 0,
@@ -120,13 +131,17 @@ def _refuse_printed(scene: Scene, pipeline: Pipeline) -> None:
             raise SceneError(message)
 
 
-def _volume(scene: Scene, pipeline: Pipeline, uploads: Uploads, box: Box) -> Volume:
+def _volume(scene: Scene, pipeline: Pipeline, uploads: Uploads, box: Box) -> Volume | RadarVolume:
     """Return the volume as uploaded, its slices where the program takes them to lie."""
-    assert isinstance(scene.volume, Volume)
     low, high = uploads.domain
-    unit = (scene.volume.values - low) / (high - low)
     kind = "unorm16" if pipeline.volume.format == "unorm16-split" else pipeline.volume.format
-    values = low + (high - low) * stored(unit, kind)
+    if isinstance(scene.volume, RadarVolume):
+        assert uploads.grid is not None
+        image = polar_image(scene.volume, uploads.grid, "clamped")
+        unit = np.where(np.isnan(image), 0.0, (image - low) / (high - low))
+        return uploaded_radar(scene.volume, uploads.grid, low + (high - low) * stored(unit, kind))
+    assert isinstance(scene.volume, Volume)
+    values = low + (high - low) * stored((scene.volume.values - low) / (high - low), kind)
     count = np.array(scene.volume.size, dtype=np.float64)
     first, gaps = 0.5 / count, count.copy()
     if pipeline.volume.slices != "centers":
