@@ -1,4 +1,4 @@
-"""Radars in the texture of seed 001: found as volref's own definition says; what eq. 18 to 20 make of them."""
+"""Radars in the texture of seed 001: held to volref's own definition; what eq. 18 to 20 make of them."""
 
 import numpy as np
 import pytest
@@ -10,6 +10,7 @@ from volref import Camera, RadarVolume, Scene, SceneError, Sweep, TransferFuncti
 from volref.emulation.box import box_of
 from volref.emulation.catalogue import named
 from volref.emulation.device import Device
+from volref.emulation.limit import limit_scene, refined
 from volref.emulation.lookup import look_up, textures_of
 from volref.emulation.passes import check_drawable
 from volref.emulation.spherical import spherical
@@ -223,6 +224,29 @@ def test_a_program_put_right_tends_to_the_truth_as_its_step_is_refined_and_the_p
     printed = [error(misplaced, steps) for steps in (250, 1000)]
     assert printed == pytest.approx([0.0387] * 2, abs=1e-4)
     assert far_from(0.0, truth) == pytest.approx(0.0258, abs=1e-4)
+
+
+def test_the_truth_that_it_tends_to_is_that_of_the_bytes_it_has_uploaded():
+    """As it is in the catalogue but for the canvas and the colour cube, from straight above: order 1."""
+    scan = sample_polar(make_storm(), azimuths=36, gates=40, gate_length=2.5e3, elevations_deg=(1, 4, 12, 40))
+    radar = radar_of_scan(scan)
+    camera = Camera.orthographic((0, 0, 200e3), (0, 0, 0), (0, 1, 0), 170e3, 1e3, 6e5)
+    scene = Scene(radar, look(0.0), camera, 12, 12)
+    program = named("congote2012-radar").with_switches(rays=EXACT, output=EXACT | {"precision": "highp"})
+    limit = limit_scene(scene, program)
+    assert [sweep.elevation for sweep in limit.volume.sweeps] == pytest.approx([1, 4, 12, 40])
+    truth = render(limit, method="march", step=25.0, certified=False).rgba
+    found = [far_from(emulate(scene, refined(scene, program, k), DEVICE).rgba, truth) for k in (1, 4, 16)]
+    assert found[1] < found[0] / 3
+    assert found[2] < found[1] / 3
+
+
+@pytest.mark.parametrize("changes", [{"geometry": "spherical-printed"}, {"seam": "clamped"}])
+def test_programs_with_another_lookup_tend_to_no_truth(changes):
+    with pytest.raises(
+        SceneError, match="must tend to an integral of emission and absorption, got one where a radar"
+    ):
+        limit_scene(SCENE, named("congote2012-radar").with_switches(volume=changes))
 
 
 # What is refused.

@@ -23,6 +23,7 @@ from volref.emulation.groups import VolumeTexture
 from volref.emulation.pipeline import Pipeline
 from volref.errors import SceneError
 from volref.scene.radar import RadarVolume
+from volref.scene.sweep import Sweep
 from volref.stages.polar import radar_table, sweep_lookup
 
 # What the lookup of a radar needs, by group.  Others would be ignored in silence.
@@ -100,6 +101,19 @@ def polar_image(radar: RadarVolume, grid: PolarGrid, seam: str) -> Floats:
     sweeps = [sweep_lookup(table, s, *points, nearest=True) for s in range(len(radar.sweeps))]
     image = np.stack(sweeps).reshape(-1, grid.gates, grid.columns)
     return np.pad(image, ((0, 0), (0, 0), (1, 1)), mode="wrap") if seam == "wrapped" else image
+
+
+def uploaded_radar(radar: RadarVolume, grid: PolarGrid, values: Floats) -> RadarVolume:
+    """Return the radar that an image (S, G, A) stands for: all gates have data, beams are straight."""
+    side = 2 * reach(radar)
+    spacing = grid.span * side / grid.gates
+    azimuths = 360.0 * (grid.turn + (np.arange(grid.columns) + 0.5) / grid.columns)
+    first = grid.start * side + 0.5 * spacing
+    tilts = np.degrees(grid.tilts).tolist()
+    sweeps = [
+        Sweep(azimuths, tilt, image.T, first, spacing) for tilt, image in zip(tilts, values, strict=True)
+    ]
+    return RadarVolume(sweeps, origin=radar.origin, quantity=radar.quantity, units=radar.units)
 
 
 def _gates(radar: RadarVolume) -> tuple[float, float, float]:
