@@ -182,3 +182,15 @@ def test_rays_that_leave_through_a_face_at_0_are_ended_by_the_count_alone():
     assert through_0 == 300
     # Sample 200 lies on the exit, 1 but for the rounding of 200 sums; sample 201 is beyond it.
     assert through_1 in (201, 202)
+
+
+@pytest.mark.parametrize("depth", ["linear", "window-over-w"])
+def test_targets_hold_1_minus_the_depth_that_the_switch_names(depth):
+    """A plate 30 before the eye and the box's back 37, between planes at 4 and 90."""
+    plate = ((-20, -20, 6), (60, 0, 0), (0, 60, 0), (1.0, 0.0, 0.0))
+    passes = facing(plates=[plate], meshes={"depth": depth, "packing": "exact"}).passes
+    for name, away in (("mesh_depth", 30.0), ("back_depth", 37.0)):
+        window_z = 90 / (90 - 4) * (1 - 4 / away)
+        expected = {"linear": (90 - away) / (90 - 4), "window-over-w": window_z / away}[depth]
+        assert passes[name][7, 10, 0] == pytest.approx(expected, rel=1e-13)
+    assert passes["back_depth"][0, 0, 0] == 0

@@ -45,8 +45,8 @@ def behind_all(
     return np.concatenate([together, objects[alone]]), np.concatenate([pixel, alone])
 
 
-def distance_shown(distance: Floats, pixel: Indices, alpha: Floats, hit: Booleans) -> Floats:
+def distance_shown(distance: Floats, pixel: Indices, alpha: Floats) -> Floats:
     """Return the distance (H, W) of meshes that are seen; +inf also where the volume hides them wholly."""
     shown = distance.copy()
-    shown.reshape(-1)[pixel[(alpha >= 1) & ~hit]] = np.inf
+    shown.reshape(-1)[pixel[alpha >= 1]] = np.inf
     return shown

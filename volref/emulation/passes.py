@@ -100,7 +100,7 @@ def emulate(
     samples = np.zeros(size, np.int64)
     samples.reshape(-1)[drawing.ends.pixel] = marched.samples
     images = {name: _image(target, size) for name, target in passes.items()}
-    distance = distance_shown(drawing.distance, drawing.ends.pixel, marched.alpha, marched.hit)
+    distance = distance_shown(drawing.distance, drawing.ends.pixel, marched.alpha)
     seconds = time.perf_counter() - began
     return Emulation(images["canvas"], distance, images, samples, seconds, program, machine)
 
