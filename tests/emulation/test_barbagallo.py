@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 
 from tests.oracles import barbagallo as oracle
+from tests.webgl.scenes import EXAMPLES
 from volref import Camera, Scene, TransferFunction, Volume, emulate, render
+from volref.emulation.ambiguity import ambiguous
 from volref.emulation.catalogue import named
 from volref.emulation.device import Device
 from volref.emulation.limit import limit_scene, refined, widened
@@ -194,7 +196,7 @@ def test_from_inside_the_box_nothing_is_drawn():
 
 def test_where_the_far_plane_cuts_off_the_back_the_page_draws_nothing_and_the_article_walks_to_a_corner():
     # The middle of the box is 2.6 away: some rays enter in front of the far plane and leave behind it.
-    scene = seen(block(128), 33, 27, far=2.6)
+    scene = dataclasses.replace(seen(block(128), 33, 27, far=2.6), background=(0.2, 0.4, 0.6, 1.0))
     page, article = (emulate(scene, name) for name in NAMES)
     cut = (page.passes["back_coordinates"] == 0).all(axis=-1)
     cut &= (page.passes["front_coordinates"] != 0).any(axis=-1)
@@ -240,3 +242,23 @@ def smooth(side=10):
     ball = np.clip(1.4 - 4 * np.sqrt(x * x + 1.3 * y * y + z * z), 0, 1)
     ball *= 0.8 + 0.2 * np.sin(9 * x + 5 * z)
     return Volume(np.rint(250 * ball).astype(np.uint8), spacing=(1 / side,) * 3)
+
+
+def test_the_table_is_the_first_row_of_a_canvas_whose_gradient_runs_to_the_far_corner():
+    # Pixel (x, y) has its centre at (x + 1/2, y + 1/2), projected on the line from (0, 0) to (255, 19).
+    scene = seen(block(1), colors=[(0, 0, 0), (1, 1, 1)])
+    table = exact("barbagallo", table={"format": "exact"})
+    row = uploads_of(scene, table).table[0]
+    along = np.array([255.0, 19.0]) / (255.0**2 + 19.0**2)
+    for x in (0, 100, 254):
+        assert row[x, 0] == pytest.approx(np.dot((x + 0.5, 0.5), along), abs=1e-12)
+    assert not row[255].any()
+
+
+def test_whether_a_ray_has_a_direction_hangs_on_rounding():
+    # Parallel rays along an edge of the box: at one pixel entry and exit are the same.
+    scene = EXAMPLES["parallel"].make()
+    pipeline, device = exact("barbagallo", stepping={"steps": 4, "cap": 8}), Device.named("swiftshader")
+    without = np.isnan(emulate(scene, pipeline, device).rgba).any(axis=-1)
+    assert without.any()
+    assert ambiguous(scene, pipeline, device)[without].all()

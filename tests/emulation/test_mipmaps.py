@@ -8,10 +8,11 @@ from volref.emulation.box import box_of
 from volref.emulation.catalogue import named
 from volref.emulation.device import Device
 from volref.emulation.entering import faces
-from volref.emulation.marching import march
+from volref.emulation.marching import Program, march
 from volref.emulation.mipmaps import classified_in_quads, level_of_detail, levels_of
 from volref.emulation.passes import prepare
-from volref.emulation.quads import beyond, lanes_of
+from volref.emulation.paths import paths_of
+from volref.emulation.quads import beyond, lanes_of, rays_in_quads
 from volref.stages.textures import Texture
 from volref.workspace import Workspace
 
@@ -100,3 +101,17 @@ def test_a_single_ray_is_refused():
     drawing = prepare(scene, named("barbagallo").with_switches(table=MIPS), Device())
     with pytest.raises(vr.SceneError, match="single rays"):
         march(drawing.program(np.zeros(scene.width * scene.height)), rays=np.array([0]))
+
+
+def test_lanes_that_have_left_the_loop_stay_at_their_last_sample():
+    scene, device = scene_of(np.full((4, 4, 4), 9, np.uint8)), Device()
+    drawing = prepare(scene, named("barbagallo").with_switches(table=MIPS, stepping={"steps": 16}), device)
+    ends, _ = rays_in_quads(scene, drawing.pipeline, drawing.box, device, drawing.targets)
+    paths = paths_of(ends, scene, drawing.pipeline, drawing.box, device)
+    places = []
+    loop = Program(drawing.textures, drawing.rule, paths, np.zeros(len(ends.pixel), np.float32))
+    marched = march(loop, lambda sample: places.append(sample.position.copy()))
+    last = marched.samples - 1
+    assert last.min() < len(places) - 1
+    at_last = np.array(places)[last, :, np.arange(len(last))]
+    np.testing.assert_array_equal(places[-1].T, at_last)
