@@ -62,7 +62,7 @@ def drawn(setting, x, y, printed):
         taken += 1
         if alpha >= 1:
             break
-    return [*color, alpha], taken
+    return [*color, 1.0 if printed else alpha], taken
 
 
 def entry(table, value):

@@ -93,5 +93,8 @@ void main() {
     place += delta;
     if (alpha >= OPAQUE_AT) break;
   }
+#ifdef PRINTED
+  alpha = 1.0; // "which is set to 1 at the end of the render process"
+#endif
   gl_FragColor = vec4(color, alpha);
 }

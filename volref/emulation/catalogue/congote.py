@@ -3,7 +3,8 @@
 Two passes draw the colour cube into RGB8 targets; the last one walks a fixed number of steps between them
 through an atlas of slices.  `congote2012-printed` is the chapter to the letter: the row of a tile by eq. 8
 and 10, the column of the second slice by eq. 9, slices mixed by x (eq. 17), the opacity of the value itself
-(eq. 1), alpha added without what is in front (eq. 4).  `congote2012` has these put right.
+(eq. 1), alpha added without what is in front (eq. 4) and set to 1 when all is done.  `congote2012` has these
+put right.
 """
 
 from volref.emulation.groups import (
@@ -36,7 +37,7 @@ PRINTED = WORKING.with_switches(
     "congote2012-printed",
     volume={"tile_row": "printed", "second_column": "printed", "between": "x"},
     opacity={"source": "value"},
-    accumulation={"rule": "add-alpha"},
+    accumulation={"rule": "add-alpha", "alpha": "one"},
 )
 
 PIPELINES = (WORKING, PRINTED)
