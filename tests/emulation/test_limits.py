@@ -77,7 +77,7 @@ def test_a_working_program_tends_to_the_truth_at_its_order(name, view):
 def test_a_surface_inside_a_program_that_compares_depths_is_met_at_order_one():
     plate = vr.Mesh([(2, 2, 7), (13, 2, 7), (13, 13, 7), (2, 13, 7)], [(0, 1, 2), (0, 2, 3)], (0.6, 0.4, 1.0))
     over = scene(ALONG_Z, meshes=[plate])
-    pipeline = widened(unhurried("arbelaz2016").with_switches(meshes={"packing": "exact"}))
+    pipeline = unhurried("arbelaz2016")
     found = errors(pipeline, over, truth(limit_scene(over, pipeline)), times=(4, 16, 64))
     # The surface lies anywhere in a step: one refinement by 2 says little, one by 16 says it all.
     assert 0.75 <= np.log2(found[0] / found[-1]) / 4 <= 1.35, found

@@ -103,9 +103,6 @@ class Device(Switches):
         ),
     ] = "log2"
     depth_bits: Annotated[int, Whole("bits of a depth buffer, 32 for floats", low=16, high=32)] = 32
-    fragment_position: Annotated[
-        str, Word("arithmetic of gl_FragCoord in WebGL 1, where it is mediump", ARITHMETIC)
-    ] = "float32"
     fragment_color: Annotated[
         str, Word("what gl_FragColor of WebGL 1, which is mediump, takes from a loop", ARITHMETIC)
     ] = "float32"
@@ -168,7 +165,6 @@ PRESETS: dict[str, Device] = {
             planes="unsnapped",
             depth_bits=24,
             blend="integer",
-            fragment_position="float16",
             fragment_color="float16",
         ),
         Device(
@@ -182,6 +178,6 @@ PRESETS: dict[str, Device] = {
             angles="mesa",
             blend="integer",
         ),
-        Device("mediump", values="float16", control="float16", fragment_position="float16"),
+        Device("mediump", values="float16", control="float16"),
     )
 }

@@ -72,7 +72,12 @@ def widened(pipeline: Pipeline) -> Pipeline:
     if pipeline.output.mean_format is not None:
         output["mean_format"] = "exact"
     return pipeline.with_switches(
-        rays=exact, volume=exact, table=exact, accumulation={"alpha": "accumulated"}, output=output
+        rays=exact,
+        volume=exact,
+        table=exact,
+        accumulation={"alpha": "accumulated"},
+        meshes={"format": "exact", "packing": "exact"},
+        output=output,
     )
 
 
