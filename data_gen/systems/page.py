@@ -10,7 +10,7 @@ HEAD = f"""# How far from the truth
 The head of the demo, drawn by every program as it is in the catalogue and held against its certified truth,
 which is off by 1/2550 at most. Numbers are differences of red, green and blue in 1/255: their mean, the
 99th percentile and the largest. Tone maps and gamma are taken off first. Opacities are meant for
-{UNIT_DISTANCE:g} mm, or for a step where the program does not correct them; factors that a program leaves open
+{UNIT_DISTANCE:g} mm, or for a step where the program does not correct them; factors that it leaves open
 suit the scene. One command draws this page
 and the pictures of the others; it takes some minutes:
 
