@@ -282,7 +282,7 @@ def test_a_last_step_is_as_long_as_what_is_left_whole_or_left_out():
 
 
 @given(seed=st.integers(0, 1000), jitter=st.booleans(), name=st.sampled_from(NAMES))
-@settings(max_examples=20, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=10, suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_a_ray_is_the_same_alone_and_among_others(seed, jitter, name):
     shown = DRAWN.setdefault(name, scene_for(name))
     drawing = DRAWN.setdefault(name + "/", prepare(shown, pipelines()[name], IDEAL))
