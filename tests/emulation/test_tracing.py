@@ -29,6 +29,18 @@ def test_a_trace_ends_with_the_pixel_of_the_canvas_and_its_count_of_samples(name
             assert values == drawn.passes[target][y, x].tolist()
 
 
+def test_a_ray_whose_neighbours_choose_its_mip_level_is_walked_with_them():
+    pipeline = pipelines()["barbagallo"].with_switches(table={"filter": "linear-mipmap"})
+    scene = example()
+    drawn, plain = (emulate(scene, one, "swiftshader") for one in (pipeline, "barbagallo"))
+    for x, y in ((8, 5), (9, 5), (8, 6), (6, 4)):
+        found = vr.trace(scene, (x, y), pipeline, device="swiftshader")
+        assert found.head["rgba"] == drawn.rgba[y, x].tolist()
+        assert len(found.table["iteration"]) == drawn.samples[y, x] == found.head["samples"]
+        assert found.head["ended"].endswith(f"after {drawn.samples[y, x]} samples")
+    assert not np.array_equal(drawn.rgba, plain.rgba)
+
+
 @pytest.mark.parametrize("name", JITTERED)
 def test_all_frames_of_a_mean_are_traced_one_after_the_other(name):
     if pipelines()[name].output.mean_format is None:

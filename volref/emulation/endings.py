@@ -9,7 +9,9 @@ import operator
 
 import numpy as np
 
+from volref.arrays import Indices
 from volref.emulation.marching import LONGEST_LOOP, Marched, Program, march
+from volref.emulation.mipmaps import LANES
 
 
 def why_ended(program: Program, marched: Marched, ray: int) -> str:
@@ -29,13 +31,20 @@ def why_ended(program: Program, marched: Marched, ray: int) -> str:
     return f"{_own_end(program, ray)}, {after}"
 
 
+def quad_of(program: Program, ray: int) -> Indices:
+    """Return the rays that are walked with one: itself, or its quad where the table has mip levels."""
+    if not program.textures.levels:
+        return np.array([ray])
+    return ray // LANES * LANES + np.arange(LANES)
+
+
 def _goes_on(program: Program, ray: int, count: int) -> bool:
     """Tell whether a ray would take another sample if the loop's cap were one more."""
     if count == LONGEST_LOOP:
         return True
     pipeline = program.textures.pipeline.with_switches(stepping={"cap": count + 1})
     textures = dataclasses.replace(program.textures, pipeline=pipeline)
-    further = march(dataclasses.replace(program, textures=textures), rays=np.array([ray]))
+    further = march(dataclasses.replace(program, textures=textures), rays=quad_of(program, ray))
     return bool(further.samples[ray] > count)
 
 

@@ -16,7 +16,6 @@ from volref.emulation.groups import Stepping
 from volref.emulation.lookup import Found, Textures, look_up, mix
 from volref.emulation.opacity import OpacityRule
 from volref.emulation.paths import Paths
-from volref.errors import SceneError
 from volref.workspace import Workspace
 
 # Rays walked together: fewer cost more calls than arithmetic, more leave the second-level cache.
@@ -106,14 +105,8 @@ class _Walk:
 def march(program: Program, observe: Observer | None = None, rays: Indices | None = None) -> Marched:
     """Return what the loop accumulates along all rays, or along some: that of the others stays 0.
 
-    Raises
-    ------
-    SceneError
-        If some are chosen, and the table has mip levels, for which a ray needs its neighbours.
+    Where the table has mip levels, those that are chosen are whole quads.
     """
-    if rays is not None and program.textures.levels:
-        message = "pipeline.table.filter must be 'linear' or 'nearest' for single rays, got 'linear-mipmap'; "
-        raise SceneError(message + "choose one to look into a pixel")
     chosen = np.arange(len(program.offset)) if rays is None else rays
     count, kind = len(program.offset), program.textures.device.values_type
     color, alpha, weighted = np.zeros((3, count), kind), np.zeros(count, kind), np.zeros(count, kind)

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from volref.arrays import Floats, float_array, whole_number
+from volref.arrays import Floats, Indices, float_array, whole_number
 from volref.emulation.box import Box, box_of
 from volref.emulation.canvas import (
     cleared,
@@ -32,8 +32,9 @@ from volref.emulation.device import Device
 from volref.emulation.entering import ends_of_rays
 from volref.emulation.gradient_volume import has_gradient_volume
 from volref.emulation.lookup import Textures, textures_of
-from volref.emulation.marching import Cut, Marched, Program, Shader, march
+from volref.emulation.marching import Cut, Marched, Observer, Program, Shader, march
 from volref.emulation.meshes import Surfaces, check_meshes, distances, surfaces_of
+from volref.emulation.mipmaps import LANES
 from volref.emulation.opacity import OpacityRule, opacity_rule
 from volref.emulation.paths import Ends, Paths, paths_of
 from volref.emulation.pipeline import Pipeline
@@ -164,24 +165,33 @@ def prepare(scene: Scene, pipeline: Pipeline, device: Device) -> Drawing:
     return Drawing(scene, pipeline, device, box, uploads, *ready)
 
 
-def march_frame(drawing: Drawing, offset: Floats) -> Marched:
+def march_frame(
+    drawing: Drawing, offset: Floats, observe: Observer | None = None, rays: Indices | None = None
+) -> Marched:
     """Return what the loop accumulates along the rays of a drawing, whose start offsets are (H * W,).
 
-    Where the table has mip levels, rays are walked with their neighbours.
+    Where the table has mip levels, rays are walked with their neighbours in lanes, which an observer sees.
+    Of `rays` alone, what the others accumulate is of no use.
     """
     if not drawing.textures.levels:
-        return march(drawing.program(offset))
+        return march(drawing.program(offset), observe, rays)
+    lanes, lane = lanes_of_rays(drawing)
+    walked = None if rays is None else (lane[rays, None] // LANES * LANES + np.arange(LANES)).reshape(-1)
+    marched = march(lanes.program(offset), observe, walked)
+    color, alpha, weighted, samples, hit = marched
+    return Marched(color[:, lane], alpha[lane], weighted[lane], samples[lane], hit[lane])
+
+
+def lanes_of_rays(drawing: Drawing) -> tuple[Drawing, Indices]:
+    """Return the drawing of all lanes of its quads, and which lane each of its rays is."""
     scene, pipeline, box, device = drawing.scene, drawing.pipeline, drawing.box, drawing.device
     ends, drawn_too = rays_in_quads(scene, pipeline, box, device, drawing.targets)
     paths = paths_of(ends, scene, pipeline, box, device)
     rule = opacity_rule(scene, pipeline, box, paths, device)
-    lanes = dataclasses.replace(drawing, ends=ends, paths=paths, rule=rule)
-    marched = march(lanes.program(offset))
     lane_of = np.zeros(scene.height * scene.width, np.intp)
     lane_of[ends.pixel[drawn_too]] = np.flatnonzero(drawn_too)
-    lane = lane_of[drawing.ends.pixel]
-    color, alpha, weighted, samples, hit = marched
-    return Marched(color[:, lane], alpha[lane], weighted[lane], samples[lane], hit[lane])
+    lanes = dataclasses.replace(drawing, ends=ends, paths=paths, rule=rule)
+    return lanes, lane_of[drawing.ends.pixel]
 
 
 def last_targets(

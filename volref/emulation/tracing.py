@@ -10,14 +10,21 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from volref.arrays import Floats, Numbers, whole_number
+from volref.arrays import Floats, Indices, Numbers, whole_number
 from volref.emulation.canvas import cleared, fragment_colors
 from volref.emulation.catalogue import named
 from volref.emulation.device import Device
-from volref.emulation.endings import why_ended
+from volref.emulation.endings import quad_of, why_ended
 from volref.emulation.lookup import Textures, look_up
-from volref.emulation.marching import Marched, Program, Sample, march
-from volref.emulation.passes import Drawing, last_targets, prepare, start_offsets
+from volref.emulation.marching import Program, Sample, march
+from volref.emulation.passes import (
+    Drawing,
+    lanes_of_rays,
+    last_targets,
+    march_frame,
+    prepare,
+    start_offsets,
+)
 from volref.emulation.pipeline import Pipeline
 from volref.emulation.slices import slice_pair
 from volref.emulation.spherical import sweep_pair
@@ -50,6 +57,9 @@ COLUMNS = {
     "opacity": Column(1, "opacity of the sample, after the rule for the step"),
     "accumulated": Column(4, "colour and alpha of the ray after the sample"),
 }
+
+MISSED = "no ray: the box is missed"
+LEFT = "its exit has x and y of 0: left without a ray"
 
 
 def trace_program(
@@ -87,46 +97,54 @@ def trace_program(
     drawing, flat = prepare(scene, program, machine), y * scene.width + x
     head: dict[str, Any] = {"pixel": [x, y], "pipeline": program.name, "device": machine.name}
     here = np.flatnonzero(drawing.ends.pixel == flat)
+    # Walked with its neighbours where the table has mip levels; the observer sees lanes then.
+    lanes, lane = (drawing, here) if not drawing.textures.levels else _lane(drawing, here)
     mean, rows = cleared(scene, program.output, machine), []
     for number, offset in enumerate(offsets, start=1):
-        loop, seen = drawing.program(offset), _Seen(number)
-        marched = march(loop, seen.look, here)
-        rows += seen.rows
+        seen = _Seen(number, lane)
+        marched = march_frame(drawing, offset, seen.look, here)
+        rows += seen.rows[: int(marched.samples[here].sum())]
         last, mean = last_targets(drawing, marched, number, mean)
     head |= {"targets": _at(dict(drawing.targets) | last, flat, scene)}
     if len(here):
-        head |= _ray(drawing, loop, marched, int(here[0]))
+        head |= _ray(lanes, lanes.program(offset), int(lane[0]))
+        fragment = fragment_colors(marched, program.accumulation)[here[0]]
+        head |= {"fragment": plain(fragment)}
     else:
         blank = flat in drawing.ends.blank
-        head |= {
-            "ended": "its exit has x and y of 0: left without a ray" if blank else "no ray: the box is missed"
-        }
+        head |= {"ended": LEFT if blank else MISSED}
     canvas = last["canvas"].reshape(-1, 4)[flat]
     nan = 1.0 if machine.nan_stored == "one" else 0.0
     head |= {"rgba": plain(canvas), "rgba8": codes_of(canvas, 8, nan=nan).tolist()}
     return Trace(head, _table(drawing, rows, count) if rows else {}, COLUMNS, "iterations")
 
 
+def _lane(drawing: Drawing, here: Indices) -> tuple[Drawing, Indices]:
+    lanes, lane_of = lanes_of_rays(drawing)
+    return lanes, lane_of[here]
+
+
 class _Seen:
     """An observer that keeps what it sees of one ray in one frame; the loop goes on to change its arrays."""
 
-    def __init__(self, frame: int) -> None:
+    def __init__(self, frame: int, ray: Indices) -> None:
         self.frame = frame
+        self.ray = ray
         self.rows: list[dict[str, Numbers]] = []
 
     def look(self, sample: Sample) -> None:
         """Keep one iteration."""
-        found = sample.found
+        found, at = sample.found, int(np.flatnonzero(sample.ray == self.ray)[0])
         row = {"frame": np.array(self.frame), "iteration": np.array(sample.number)}
-        row |= {"position": sample.position[:, 0].copy(), "value": found.value[0].copy()}
-        row |= {"found": found.color[:, 0].copy(), "opacity": sample.opacity[0].copy()}
-        row["accumulated"] = np.append(sample.color[:, 0], sample.alpha[0])
+        row |= {"position": sample.position[:, at].copy(), "value": found.value[at].copy()}
+        row |= {"found": found.color[:, at].copy(), "opacity": sample.opacity[at].copy()}
+        row["accumulated"] = np.append(sample.color[:, at], sample.alpha[at])
         if sample.share is not None:
-            row["step_share"] = sample.share[0].copy()
+            row["step_share"] = sample.share[at].copy()
         if found.gradient is not None:
-            row["gradient"] = found.gradient[:, 0].copy()
+            row["gradient"] = found.gradient[:, at].copy()
         if found.magnitude is not None:
-            row["magnitude"] = found.magnitude[0].copy()
+            row["magnitude"] = found.magnitude[at].copy()
         self.rows.append(row)
 
 
@@ -140,9 +158,10 @@ def _at(targets: dict[str, Floats], flat: int, scene: Scene) -> dict[str, Any]:
     }
 
 
-def _ray(drawing: Drawing, loop: Program, marched: Marched, ray: int) -> dict[str, Any]:
+def _ray(drawing: Drawing, loop: Program, ray: int) -> dict[str, Any]:
     """Return what there is one of along a ray."""
     paths, cut = drawing.paths, drawing.cut
+    marched = march(loop, rays=quad_of(loop, ray))
     found: dict[str, Any] = {"entry": plain(paths.entry[:, ray]), "exit": plain(paths.exit[:, ray])}
     found |= {"step": plain(paths.delta[:, ray]), "steps": int(paths.count[ray])}
     lengths = {"texture": paths.texture_step[ray], "world": paths.world_step[ray]}
@@ -151,9 +170,7 @@ def _ray(drawing: Drawing, loop: Program, marched: Marched, ray: int) -> dict[st
     if cut is not None:
         depths = {"entry": cut.depth[ray], "step": cut.step[ray], "surface": cut.surface[ray]}
         found["depth"] = {name: _plain(depth) for name, depth in depths.items()}
-    found |= {"samples": int(marched.samples[ray]), "ended": why_ended(loop, marched, ray)}
-    fragment = fragment_colors(marched, drawing.pipeline.accumulation)[ray]
-    return found | {"fragment": plain(fragment)}
+    return found | {"samples": int(marched.samples[ray]), "ended": why_ended(loop, marched, ray)}
 
 
 def _plain(number: np.floating[Any]) -> float | None:
