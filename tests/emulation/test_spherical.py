@@ -13,7 +13,7 @@ from volref.emulation.device import Device
 from volref.emulation.limit import limit_scene, refined
 from volref.emulation.lookup import look_up, textures_of
 from volref.emulation.passes import check_drawable
-from volref.emulation.spherical import spherical
+from volref.emulation.spherical import spherical, sweep_pair
 from volref.emulation.uploads import uploads_of
 from volref.phantoms.storms import make_storm, radar_of_scan, sample_polar
 from volref.workspace import Workspace
@@ -130,6 +130,16 @@ def test_sweeps_of_their_own_grids_are_brought_to_one_gate_by_gate():
     # Gates of 2 km are repeated; of radials 120 degrees apart each second column is nearer to one of them.
     np.testing.assert_array_equal(codes[6:12, 0], [1, 1, 2, 2, 3, 3])
     np.testing.assert_array_equal(codes[6:12, 4], [7, 7, 8, 8, LOW, LOW])
+    floats = uploads_of(scene, pipeline.with_switches(volume={"format": "float"})).volume[..., 0]
+    np.testing.assert_array_equal(floats[10:12, 4], 0)
+
+
+def test_on_a_sweep_the_one_above_is_the_second_as_the_last_match_of_the_search_is_kept():
+    radar = noise((-5.0, 0.0, 5.0))
+    grid = uploads_of(scene_of(radar), named("congote2012-radar")).grid
+    level = np.array([[0.7], [0.4], [0.5]])
+    pair, seen = sweep_pair(named("congote2012-radar").volume, grid, level, DEVICE)
+    assert (pair.first.item(), pair.share.item(), seen.item()) == (1.0, 0.0, True)
 
 
 # Printed.
@@ -283,8 +293,10 @@ def test_switches_that_a_radar_has_no_use_for_are_refused(group, switches, words
 
 
 def test_a_single_sweep_has_nothing_between_two():
-    scene = scene_of(noise((5.0,)))
+    scene = scene_of(noise((0.0,)))
     assert not emulate(scene, "congote2012-radar").rgba.any()
+    on_it = np.array([[30e3], [20e3], [0.0]])
+    assert looked_up(scene, widened(), on_it)[0] == LOW
 
 
 def test_steps_by_length_follow_the_gates():
