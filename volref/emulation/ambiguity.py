@@ -3,8 +3,10 @@
 A GPU program is full of them: is the ray at its end, is alpha at its threshold, is the surface met, does the
 pixel centre lie inside an edge, which byte is nearest.  Two correct machines may answer differently where the
 two sides are all but equal, and the pixel then differs by a whole sample.  They are found by drawing the
-scene again with the eye moved by a few millionths of the box and the threshold of alpha by as much: what
-stays the same within half an 8-bit step does not hang on a comparison.
+scene again with the eye moved by a few millionths of the box, and the threshold of alpha and the length of a
+step by as much: what stays the same within half an 8-bit step does not hang on a comparison.  (A step of
+another length is needed where a ray goes through two parallel faces: no move of the eye changes how long it
+is there.)
 """
 
 import dataclasses
@@ -17,15 +19,20 @@ from numpy.typing import ArrayLike
 from volref.arrays import Booleans, Floats
 from volref.emulation.box import box_of
 from volref.emulation.device import Device
+from volref.emulation.groups import Stepping
 from volref.emulation.passes import emulate, prepare
-from volref.emulation.paths import vector_length
+from volref.emulation.paths import vector_length, world_step_of
 from volref.emulation.pipeline import Pipeline
+from volref.emulation.switches import Plain
 from volref.scene.camera import Camera
 from volref.scene.scene import Scene
 from volref.scene.transform import affine
 
 # 32 units in the last place of float32 at 1; positions are off by a few after some hundred additions.
 NUDGE = 2.0**-19
+
+# What `Stepping.opaque_at` goes up to.
+HIGHEST_THRESHOLD = 2.0
 
 # A pixel that changes by more than this hangs on a comparison; one that does not, changes by about NUDGE.
 VISIBLE = 0.5 / 255
@@ -71,15 +78,26 @@ def _floating(pipeline: Pipeline) -> Pipeline:
 
 
 def _nudged(scene: Scene, pipeline: Pipeline) -> Iterator[tuple[Scene, Pipeline]]:
-    """Yield the scene from the eight corners of a small cube around the eye, and thresholds on both sides."""
+    """Yield the scene from the corners of a small cube around the eye, thresholds and steps on both sides."""
     size = NUDGE * float(box_of(scene).sides.min())
+    threshold, length = pipeline.stepping.opaque_at, _step_length(scene, pipeline.stepping)
     for corner in product((-1.0, 1.0), repeat=3):
-        threshold = pipeline.stepping.opaque_at
-        changed = pipeline
+        changes: dict[str, Plain] = {}
         if threshold is not None:
-            changed = pipeline.with_switches(stepping={"opaque_at": threshold + corner[0] * NUDGE})
+            changes["opaque_at"] = min(max(threshold + corner[0] * NUDGE, 0.0), HIGHEST_THRESHOLD)
+        if length is not None:
+            changes["length"] = length * (1 + corner[1] * NUDGE)
         camera = _moved(scene.camera, size * np.array(corner))
-        yield dataclasses.replace(scene, camera=camera), changed
+        yield dataclasses.replace(scene, camera=camera), pipeline.with_switches(stepping=changes)
+
+
+def _step_length(scene: Scene, stepping: Stepping) -> float | None:
+    """Return the length of a step in the units of its rule; None where a count decides."""
+    if stepping.rule == "count":
+        return None
+    if stepping.rule == "world-length":
+        return world_step_of(stepping, scene)
+    return stepping.length or (1.0 if stepping.rule == "voxel-count" else 1.0 / stepping.steps)
 
 
 def _moved(camera: Camera, by: Floats) -> Camera:
