@@ -14,8 +14,10 @@ import numpy as np
 from volref.arrays import Booleans, Floats, Indices, Integers
 from volref.emulation.groups import Stepping
 from volref.emulation.lookup import Found, Textures, look_up, mix
+from volref.emulation.mipmaps import LANES
 from volref.emulation.opacity import OpacityRule
 from volref.emulation.paths import Paths
+from volref.errors import SceneError
 from volref.workspace import Workspace
 
 # Rays walked together: fewer cost more calls than arithmetic, more leave the second-level cache.
@@ -105,8 +107,14 @@ class _Walk:
 def march(program: Program, observe: Observer | None = None, rays: Indices | None = None) -> Marched:
     """Return what the loop accumulates along all rays, or along some: that of the others stays 0.
 
-    Where the table has mip levels, those that are chosen are whole quads.
+    Raises
+    ------
+    SceneError
+        If the table has mip levels, for which a ray needs its neighbours, and not whole quads are chosen.
     """
+    if rays is not None and program.textures.levels and len(rays) % LANES:
+        message = "pipeline.table.filter must be 'linear' or 'nearest' for single rays, got 'linear-mipmap'; "
+        raise SceneError(message + "walk whole quads")
     chosen = np.arange(len(program.offset)) if rays is None else rays
     count, kind = len(program.offset), program.textures.device.values_type
     color, alpha, weighted = np.zeros((3, count), kind), np.zeros(count, kind), np.zeros(count, kind)
