@@ -138,5 +138,5 @@ def check_spherical(pipeline: Pipeline) -> None:
                 message += f"{pipeline.volume.geometry!r}, got {got!r}; "
                 raise SceneError(message + "set it so, or volume.geometry to 'box'")
     if pipeline.stepping.rule == "voxel-count":
-        message = f"pipeline.stepping.rule must not be 'voxel-count' for a radar in {pipeline.name!r}, "
-        raise SceneError(message + "which has no voxels; choose 'count' or a length")
+        message = "pipeline.stepping.rule must be one without voxels for a radar, got 'voxel-count' in "
+        raise SceneError(message + f"{pipeline.name!r}; choose 'count' or a length")
