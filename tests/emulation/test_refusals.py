@@ -331,8 +331,8 @@ def test_a_world_of_any_scale_is_drawn_the_same(name, side):
     changes = {"output": {"format": "float"}, "stepping": {"opaque_at": None}}
     one, other = (drawn(cube(side=s, size=(5, 4)), name, **changes) for s in (1.0, side))
     apart = np.abs(one.rgba - other.rgba).max(axis=-1)
-    # Positions are rounded to float32 elsewhere: a sample more or less at an exit or a silhouette, a byte of a
-    # coordinate, in one pixel of twenty at most, and 2e-5 of colour in the others.
+    # Positions are rounded to float32 elsewhere: a sample more or less at an exit or a silhouette, a byte of
+    # a coordinate, in one pixel of twenty at most, and 2e-5 of colour in the others.
     assert np.sort(apart.reshape(-1))[-2] <= 2e-5
     assert np.abs(one.samples - other.samples).max() <= 1
 
