@@ -9,6 +9,7 @@ from tests.emulation.scenes import HEIGHT, WIDTH, example, jitter_of, radar_exam
 from volref import (
     Camera,
     Light,
+    Material,
     Mesh,
     Pipeline,
     Plane,
@@ -62,6 +63,7 @@ def lit(light):
     return changed(scene_for("cej2020"), lights=(light,))
 
 
+LAMP = Light.point((9, 9, 9), (1, 1, 1))
 SPINNING = Light.point((9, 9, 9), (1, 1, 1), attenuation=(1, 0.5, 0))
 JITTER = np.zeros((1, HEIGHT, WIDTH))
 
@@ -211,12 +213,77 @@ REFUSED = [
         lambda: emulate(radar_example(), spherical(volume={"layout": "3d"})),
         ("pipeline.volume.layout", "'atlas'", "'3d'"),
     ),
+    ("no scene", lambda: emulate(None, "texture3d"), ("scene", "got NoneType", "build one")),
+    ("a number for a pipeline", lambda: emulate(example(), 3), ("pipeline", "got int", "build one")),
+    ("a number for a device", lambda: emulate(example(), "texture3d", 3), ("device", "got int", "build one")),
+    (
+        "jitter beyond a step",
+        lambda: emulate(example(), "vpt-eam", jitter=JITTER + 1.5),
+        ("jitter", "0..1", "got 1.5", "shares of a step"),
+    ),
+    ("jitter before a step", lambda: emulate(example(), "vpt-eam", jitter=JITTER - 1), ("jitter", "got -1")),
+    (
+        "another operator",
+        lambda: emulate(changed(scene_for("cej2020"), lights=(LAMP,), gradient="analytic"), "cej2020"),
+        ("scene.gradient", "'sobel'", "'analytic'", "pipeline.lighting.gradient"),
+    ),
+    (
+        "a table of value and gradient in one row",
+        lambda: emulate(
+            changed(transfer=two_dimensional()), pipelines()["cej2020"].with_switches(table={"rows": 1})
+        ),
+        ("pipeline.table.rows", "got 1", "'cej2020'"),
+    ),
+    *(
+        (
+            f"{rule}, {advance}, {end}",
+            lambda rule=rule, advance=advance, end=end: emulate(
+                example(), program(stepping={"rule": rule, "advance": advance, "end": end})
+            ),
+            ("pipeline.stepping", "'"),
+        )
+        for rule, advance, end in [
+            ("count", "add", "parameter"),
+            ("count", "multiply", "outside"),
+            ("count", "parameter", "outside"),
+            ("world-length", "parameter", "length-before"),
+            ("voxel-count", "parameter", "count"),
+            ("voxel-count", "multiply", "length-left"),
+            ("count", "add", "outside-above"),
+        ]
+    ),
     (
         "voxels of a radar",
         lambda: emulate(radar_example(), spherical(stepping={"rule": "voxel-count"})),
         ("pipeline.stepping.rule", "'voxel-count'", "choose"),
     ),
 ]
+
+
+CARTESIAN = [name for name, pipeline in pipelines().items() if pipeline.volume.geometry == "box"]
+UNLIT = [name for name, pipeline in pipelines().items() if pipeline.lighting.model == "none"]
+
+
+@pytest.mark.parametrize("name", UNLIT)
+def test_a_program_without_lights_refuses_a_lit_scene_and_draws_an_unlit_one(name):
+    shown = scene_for(name)
+    if isinstance(shown.volume, Volume):
+        with pytest.raises(SceneError, match=r"scene.lights must be empty .* got 1; leave them out"):
+            emulate(changed(shown, lights=(LAMP,)), name)
+    unlit = changed(shown, lights=(LAMP,), material=Material("unlit"))
+    np.testing.assert_array_equal(emulate(unlit, name).rgba, emulate(shown, name).rgba)
+
+
+@pytest.mark.parametrize("name", CARTESIAN)
+def test_a_scene_does_not_change_the_order_in_which_a_program_classifies(name):
+    own = pipelines()[name].table.order
+    for order in ("pre", "per-slice"):
+        asked = changed(cube(), classification=order)
+        if order == own:
+            np.testing.assert_array_equal(drawn(asked, name).rgba, drawn(cube(), name).rgba)
+            continue
+        with pytest.raises(SceneError, match=f"scene.classification must be 'post' .* got '{order}'; set"):
+            drawn(asked, name)
 
 
 @pytest.mark.parametrize(
@@ -251,9 +318,6 @@ def cube(
     camera = Camera.look_at(eye, middle, (0, 1, 0.1), 30, 0.5 * side, 9 * side)
     volume = Volume(values, spacing=spacing, origin=spacing / 2, **place)
     return Scene(volume, transfer, camera, *size, background=background)
-
-
-CARTESIAN = [name for name, pipeline in pipelines().items() if pipeline.volume.geometry == "box"]
 
 
 def drawn(shown, name, **changes):
@@ -335,13 +399,6 @@ def test_a_world_of_any_scale_is_drawn_the_same(name, side):
     # a coordinate, in one pixel of twenty at most, and 2e-5 of colour in the others.
     assert np.sort(apart.reshape(-1))[-2] <= 2e-5
     assert np.abs(one.samples - other.samples).max() <= 1
-
-
-@pytest.mark.parametrize("name", [name for name in CARTESIAN if pipelines()[name].lighting.model == "none"])
-def test_lights_change_nothing_in_a_program_that_has_none(name):
-    shown = cube()
-    under = changed(shown, lights=(Light.headlight((1, 1, 1)), Light.ambient((3, 0, 0))))
-    np.testing.assert_array_equal(drawn(under, name).rgba, drawn(shown, name).rgba)
 
 
 def test_a_mesh_behind_everything_and_one_out_of_sight_are_drawn():

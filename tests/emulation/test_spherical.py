@@ -284,7 +284,7 @@ def test_a_grid_is_refused_by_programs_for_radars_and_a_radar_by_those_for_grids
         ("volume", {"padding": 1}, "pipeline.volume.padding must be 0"),
         ("table", {"order": "per-slice"}, "pipeline.table.order must be 'post'"),
         ("lighting", {"gradient": "central"}, "pipeline.lighting.gradient must be 'none'"),
-        ("stepping", {"rule": "voxel-count"}, "must not be 'voxel-count' for a radar"),
+        ("stepping", {"rule": "voxel-count"}, "must be one without voxels for a radar"),
     ],
 )
 def test_switches_that_a_radar_has_no_use_for_are_refused(group, switches, words):

@@ -137,7 +137,10 @@ def test_a_ray_that_is_opaque_says_at_which_alpha_and_after_how_many_samples():
         ),
         ({"cap": 5}, "the loop has run 5 times, its cap"),
         ({"rule": "texture-length", "advance": "add", "end": "outside"}, "the position is outside the box"),
-        ({"rule": "texture-length", "advance": "add", "end": "outside-above"}, "a coordinate is above 1"),
+        (
+            {"rule": "texture-length", "advance": "add", "end": "outside-above", "cap": 999},
+            "a coordinate is above 1",
+        ),
         ({"rule": "texture-length", "advance": "add", "end": "length-left"}, "no length is left of "),
         ({"end": "length-after"}, "is walked in steps of "),
         ({"last_step": "dropped"}, "another whole step of "),

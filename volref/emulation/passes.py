@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from volref.arrays import Floats, Indices, float_array, whole_number
+from volref.emulation.agreement import check_agreement, check_kinds, check_steps
 from volref.emulation.box import Box, box_of
 from volref.emulation.canvas import (
     cleared,
@@ -87,7 +88,8 @@ def emulate(
     """
     began = time.perf_counter()
     program = named(pipeline) if isinstance(pipeline, str) else pipeline
-    machine = Device.named(device) if isinstance(device, str) else device or Device()
+    machine = Device.named(device) if isinstance(device, str) else Device() if device is None else device
+    check_kinds(scene, program, machine)
     count = whole_number("frames", frames, low=1, high=1 << 20)
     offsets = start_offsets(scene, program, jitter, count)
     drawing = prepare(scene, program, machine)
@@ -144,8 +146,10 @@ def prepare(scene: Scene, pipeline: Pipeline, device: Device) -> Drawing:
         If the scene holds what the program cannot draw.
     """
     check_drawable(scene, pipeline)
+    check_steps(pipeline.stepping)
     check_meshes(scene, pipeline)
     check_gradients(scene, pipeline)
+    check_agreement(scene, pipeline)
     box, uploads = box_of(scene), uploads_of(scene, pipeline)
     surfaces, cut = surfaces_of(scene, device), None
     targets = mesh_targets(scene, pipeline, box, device, surfaces)
@@ -241,8 +245,18 @@ def start_offsets(scene: Scene, pipeline: Pipeline, jitter: ArrayLike | None, fr
         if not pipeline.stepping.jitter:
             message = "jitter must be None for a pipeline that has none, got numbers; "
             raise SceneError(message + "set pipeline.stepping.jitter, or leave it out")
-        offsets = offsets + float_array("jitter", jitter, size)
+        offsets = offsets + checked_jitter(jitter, size)
     return offsets.reshape(frames, -1)
+
+
+def checked_jitter(jitter: ArrayLike, size: tuple[int, int, int]) -> Floats:
+    """Return start offsets of this size, all of 0..1."""
+    offsets = float_array("jitter", jitter, size)
+    for worst in (offsets.min(), offsets.max()):
+        if not 0 <= worst <= 1:
+            message = f"jitter must lie in 0..1, got {worst:g}; give shares of a step"
+            raise SceneError(message)
+    return offsets
 
 
 def check_drawable(scene: Scene, pipeline: Pipeline) -> None:
