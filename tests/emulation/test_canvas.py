@@ -232,6 +232,13 @@ def test_light_below_0_is_black_after_a_gamma():
     np.testing.assert_array_equal(found, [0, 0, 1, 0.5])
 
 
+def test_light_that_16_bits_cannot_hold_is_infinite_and_then_white():
+    found = tone_mapped(np.float16([100.0, 1.0, 0.0, 0.5]), Output(gamma=0.1), BACKGROUND)
+    assert found.dtype == np.float16
+    np.testing.assert_array_equal(found, [np.inf, 1, 0, 0.5])
+    assert one_pixel([np.inf, 0, 0, 1], [0.0] * 4, {"blend": "none", **BYTES})[0] == 1
+
+
 @pytest.mark.parametrize("device", [IDEAL, SWIFT, Device("d", mix="sum")])
 @given(frames=st.lists(st.integers(0, 255), min_size=1, max_size=8))
 def test_a_mean_of_frames_in_bytes_is_rounded_at_every_frame(device, frames):

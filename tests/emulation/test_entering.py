@@ -228,6 +228,12 @@ def test_an_eye_on_a_face_is_not_inside():
     assert len(ends_of("slab", shown)[0].pixel) == WIDTH * HEIGHT
 
 
+def test_an_eye_on_the_far_face_that_looks_away_has_no_rays_of_no_length():
+    # Texture space along z is exact: 0 at the face, from which all rays leave at once.
+    away = ((0.0, 0.0, -2.0), (0.0, 0.0, -5.0), (0, 1, 0), 60.0)
+    assert not len(ends_of("slab", scene(away, near=0.1))[0].pixel)
+
+
 def test_faces_before_the_near_plane_are_clipped_with_the_rays_that_need_them():
     # The near plane cuts the box: the eye is 1 before the front face, the plane 2.5 away.
     look = ((0.3, 0.2, 3.0), (0.0, 0.0, 0.0), (0, 1, 0), 75.0)

@@ -98,11 +98,14 @@ def test_a_transparent_table_leaves_the_background_exactly(name):
         np.testing.assert_array_equal(out.rgba[~drawn], np.broadcast_to(over, out.rgba[~drawn].shape))
 
 
-def fog(value=255, opacity=0.3, width=5, height=4):
-    """A cube of one value and white; rays through it are of many lengths."""
+AXIS = Camera.orthographic((0.5, 0.5, 3), (0.5, 0.5, 0.5), (0, 1, 0), 0.1, 1, 9)
+CORNER = Camera.look_at((1.9, 1.4, 2.7), (0.5, 0.5, 0.5), (0, 1, 0), 32, 0.1, 9)
+
+
+def fog(value=255, opacity=0.3, width=5, height=4, camera=CORNER):
+    """A cube of one value and white; rays through it from the corner are of many lengths."""
     volume = Volume(np.full((4, 4, 4), value, np.uint8), spacing=(0.25,) * 3, origin=(0.125,) * 3)
     transfer = TransferFunction.from_opacity([0, 255], [(1, 1, 1)] * 2, [opacity] * 2)
-    camera = Camera.look_at((1.9, 1.4, 2.7), (0.5, 0.5, 0.5), (0, 1, 0), 32, 0.1, 9)
     return Scene(volume, transfer, camera, width, height)
 
 
@@ -152,6 +155,7 @@ def walked(stepping, paths, offset, ray, opacity):
 ENDS = [
     {"rule": "count", "steps": 13, "end": "count"},
     {"rule": "voxel-count", "length": 0.21, "end": "count"},
+    {"rule": "count", "steps": 8, "advance": "parameter", "end": "parameter"},
     {"rule": "count", "steps": 10, "advance": "parameter", "end": "parameter"},
     {"rule": "count", "steps": 200, "advance": "parameter", "end": "parameter"},
     {"rule": "texture-length", "length": 0.043, "end": "length-before", "last_step": "whole"},
@@ -252,11 +256,55 @@ def test_samples_are_put_together_as_the_rule_says(rule, light):
         np.testing.assert_allclose(out[[channel, 3]], [light * color, alpha], rtol=0, atol=1e-12)
 
 
+@pytest.mark.parametrize(("source", "expected"), [("table", [0.5, 0.25]), ("value", [1.0, 0.0])])
+def test_a_weighted_alpha_sums_what_samples_have_before_the_step_by_what_they_weigh(source, expected):
+    # Two samples of value 1 and opacity 1/2, as they are: weights 1/2 and 1/4, or 1 and 0 of the value's own.
+    stepping = {"rule": "count", "steps": 2, "end": "count"}
+    exact = {"format": "exact"}
+    pipeline = Pipeline("p").with_switches(
+        stepping=stepping,
+        table=exact,
+        output=exact | {"blend": "none"},
+        accumulation={"alpha": "weighted"},
+        opacity={"rule": "as-is", "source": source},
+    )
+    alpha = emulate(fog(opacity=0.5, camera=AXIS, width=1, height=1), pipeline).rgba.reshape(-1)[3]
+    assert alpha == sum(weight * (0.5 if source == "table" else 1.0) for weight in expected)
+
+
+@pytest.mark.parametrize(
+    "stepping",
+    [
+        {"end": "length-before", "last_step": "whole"},
+        {"end": "length-before", "last_step": "partial"},
+        {"end": "length-before", "last_step": "dropped"},
+        {"end": "length-after", "advance": "add"},
+        {"rule": "texture-length", "end": "length-left", "advance": "add"},
+    ],
+    ids=lambda s: "-".join(s.values()),
+)
+def test_a_ray_as_long_as_four_steps_takes_four(stepping):
+    # 1 in steps of 1/4: all numbers are exact.
+    shown = fog(camera=AXIS, width=1, height=1)
+    pipeline = Pipeline("p").with_switches(stepping={"rule": "world-length", "length": 0.25} | stepping)
+    assert emulate(shown, pipeline).samples.item() == 4
+
+
+@pytest.mark.parametrize(("end", "count"), [("outside", 5), ("outside-above", 5)])
+@pytest.mark.parametrize("eye", [-2.0, 3.0])
+def test_a_ray_that_ends_outside_takes_the_sample_on_the_far_face(eye, end, count):
+    # Samples at 0, 1/4 ... 1 are inside, where the program looks before it has stepped out at 5/4 or -1/4.
+    camera = Camera.orthographic((0.5, 0.5, eye), (0.5, 0.5, 0.5), (0, 1, 0), 0.1, 1, 9)
+    stepping = {"rule": "texture-length", "length": 0.25, "advance": "add", "end": end, "cap": 9}
+    found = emulate(fog(camera=camera, width=1, height=1), Pipeline("p").with_switches(stepping=stepping))
+    # Faces at 0 are missed by a test of what is above 1, which is of the sample that has just been taken.
+    expected = count if end == "outside" else {3.0: 9, -2.0: count + 1}[eye]
+    assert found.samples.item() == expected
+
+
 def test_a_last_step_is_as_long_as_what_is_left_whole_or_left_out():
     # A depth of 1 in steps of 0.3: three whole ones and a third of one.
-    shown = fog(opacity=0.4)
-    camera = Camera.orthographic((0.5, 0.5, 3), (0.5, 0.5, 0.5), (0, 1, 0), 0.1, 1, 9)
-    shown = Scene(shown.volume, shown.transfer, camera, 1, 1)
+    shown = fog(opacity=0.4, width=1, height=1, camera=AXIS)
     exact = {"format": "exact"}
     seen = {}
     for word in ("partial", "whole", "dropped"):

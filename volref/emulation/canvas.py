@@ -49,6 +49,8 @@ def over_environment(
     return np.asarray(fragments + behind)
 
 
+# A GPU goes on with the infinities of 16 bits, or of a light that a small gamma raises to a large power.
+@np.errstate(over="ignore", invalid="ignore", divide="ignore")
 def tone_mapped(rgba: Floats, output: Output, background: RGBA) -> Floats:
     """Return colours (..., 4) squeezed, put over the background by shaders that do, raised to 1 / gamma.
 

@@ -5,7 +5,7 @@ F fragments, R rays.  The coordinate targets of two passes are (H, W, 3), in the
 
 import numpy as np
 
-from volref.arrays import Floats, Indices
+from volref.arrays import Floats
 from volref.emulation.box import CORNERS, Box
 from volref.emulation.device import Device
 from volref.emulation.focal import focal_ends
@@ -38,7 +38,7 @@ def ends_of_rays(
         return focal_ends(scene, pipeline.rays.direction, box, device, surface), {}
     if pipeline.rays.direction == "unproject":
         return unprojected_ends(scene, box, device, surface), {}
-    return _slab(scene, pipeline, box, device, surface), {}
+    return _slab(scene, box, device, surface), {}
 
 
 def faces(scene: Scene, box: Box, device: Device, cull: str) -> Fragments:
@@ -142,33 +142,16 @@ def _forward(camera: Camera) -> Floats:
     return np.asarray(-camera.world_from_view[:3, 2])
 
 
-def _slab(scene: Scene, pipeline: Pipeline, box: Box, device: Device, surface: Floats | None) -> Ends:
+def _slab(scene: Scene, box: Box, device: Device, surface: Floats | None) -> Ends:
     pixels = np.arange(scene.width * scene.height)
-    origins, directions = _world_rays(scene, pipeline.rays.direction, pixels)
-    starts = transform_points(box.texture_from_world, origins).T
-    along = transform_directions(box.texture_from_world, directions).T
+    rays = pixel_rays(scene.camera, scene.width, scene.height, pixels)
+    starts = transform_points(box.texture_from_world, rays.origins).T
+    along = transform_directions(box.texture_from_world, rays.directions).T
     spans = box_spans(starts, along, np.zeros(3), np.ones(3))
     t_near, t_far = spans.t_near, spans.t_far
     if surface is not None:
-        t_far = np.minimum(t_far, surface[:, 0] - _behind_start(scene.camera, origins))
+        t_far = np.minimum(t_far, surface[:, 0])
     hit = np.flatnonzero(t_near < t_far)
     kind = device.control_type
     near, far = ((starts[:, hit] + t[hit] * along[:, hit]).astype(kind) for t in (t_near, t_far))
     return Ends(hit, near, far)
-
-
-def _behind_start(camera: Camera, origins: Floats) -> Floats:
-    """Return how far (R,) rays that do not start where distances are measured from start behind that."""
-    if camera.is_parallel:
-        return np.zeros(len(origins))
-    return np.asarray(np.linalg.norm(origins - camera.world_from_view[:3, 3], axis=1))
-
-
-def _world_rays(scene: Scene, rule: str, pixels: Indices) -> tuple[Floats, Floats]:
-    """Return origins and unit directions (R, 3) in the world; the volume is seen from the origin on."""
-    camera = scene.camera
-    rays = pixel_rays(camera, scene.width, scene.height, pixels)
-    if rule == "eye" or camera.is_parallel:
-        return rays.origins, rays.directions
-    share = rays.directions @ _forward(camera)
-    return rays.origins + rays.directions * (camera.near / share)[:, None], rays.directions
