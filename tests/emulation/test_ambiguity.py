@@ -114,3 +114,37 @@ def test_a_mean_of_bytes_is_looked_at_as_bytes_too():
     found = ambiguous(shown, program({**COUNT, "jitter": True}, output=output), frames=2)
     assert found.shape == (shown.height, shown.width)
     assert found.mean() < 0.2
+
+
+def slope(opacity):
+    """One pixel that looks through x = 1/2 of a ramp of opacity from 0 to `opacity`, white."""
+    values = np.zeros((2, 2, 2), np.uint8)
+    values[..., 1] = 255
+    shown = cube(values=values)
+    transfer = TransferFunction.from_opacity([0, 255], [(1, 1, 1)] * 2, [0, opacity])
+    return Scene(shown.volume, transfer, shown.camera, 1, 1)
+
+
+ONE_SAMPLE = {
+    "stepping": {**COUNT, "steps": 1},
+    "opacity": {"rule": "as-is"},
+    "table": {"format": "exact", "coordinate": "centered", "baked": "ends"},
+}
+
+
+def test_a_byte_of_the_canvas_that_may_be_either_of_two_hangs_on_nothing():
+    # 127.5 of 255: a nudge makes it 127 or 128, both half a step beside the colour.
+    assert not ambiguous(slope(1.0), program(**ONE_SAMPLE, output={"format": "unorm8"})).any()
+
+
+@pytest.mark.parametrize(("share", "hangs"), [(1.0, True), (0.8, False)])
+def test_a_byte_of_a_mean_that_may_be_black_or_not_is_found_where_a_gamma_makes_it_visible(share, hangs):
+    # 0.5 of 255: byte 0 or 1, which a gamma of 2.2 makes 0 or 21.
+    output = {"format": "unorm8", "mean_format": "unorm8", "gamma": 2.2}
+    assert ambiguous(slope(share / 255), program(**ONE_SAMPLE, output=output)).all() == hangs
+
+
+@pytest.mark.parametrize(("before", "hangs"), [(2.0**-21, True), (2.0**-12, False)])
+def test_a_ray_that_is_next_to_nothing_is_found_though_nothing_is_seen_of_it(before, hangs):
+    camera = Camera.look_at((0.5, 0.5, before), (0.5, 0.5, -1), (0, 1, 0), 10, 0.1, 9)
+    assert ambiguous(cube(0.0, camera=camera), program()).all() == hangs

@@ -195,6 +195,13 @@ def test_an_exit_of_0_is_walked_or_left():
     np.testing.assert_array_equal(left.entry, walked.entry[:, ~none])
     np.testing.assert_array_equal(left.blank, walked.pixel[none])
     assert not len(walked.blank)
+    # A fragment that is left is transparent black, which replaces the background without a blend state.
+    program = IDEAL["coordinates"].with_switches(
+        rays={"format": "unorm8", "no_exit": "left"}, output={"blend": "none"}
+    )
+    background = (0.5, 0.25, 0.0, 1.0)
+    out = emulate(Scene(close.volume, TRANSFER, close.camera, 12, 12, background=background), program)
+    assert not out.rgba.reshape(-1, 4)[left.blank].any()
 
 
 INSIDE = ((0.5, 0.3, 1.0), (-1.0, 0.0, -1.0), (0, 1, 0), 70.0)
