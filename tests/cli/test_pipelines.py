@@ -185,6 +185,14 @@ def test_a_file_of_answers_that_cannot_be_is_refused_in_one_line(given, sentence
     assert sentence in err
 
 
+def test_answers_that_do_not_go_together_are_told_at_once(tmp_path, capsys):
+    path = answers(tmp_path, stepping__end="parameter")
+    status, out, err = run(capsys, "pipelines", "new", "--answers", path)
+    assert status == 0
+    assert json.loads(out)["stepping"]["end"] == "parameter"
+    assert "emulate will refuse it: pipeline.stepping.advance must be 'parameter' for end 'parameter'" in err
+
+
 def test_questions_need_somebody_to_answer_them(tmp_path, capsys, monkeypatch, typed):
     monkeypatch.setattr("sys.stdin", io.StringIO(""))
     status, _, err = run(capsys, "pipelines", "new")

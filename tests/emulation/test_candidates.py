@@ -85,3 +85,8 @@ def test_combinations_that_break_a_rule_together_are_left_out():
     found = vr.Candidates(Pipeline("x"), {"output.low": (0.0, 0.6), "output.mid": (0.5, 0.7)})
     assert found.count == 4
     assert [(p.output.low, p.output.mid) for p in found] == [(0.0, 0.5), (0.0, 0.7), (0.6, 0.7)]
+
+
+def test_steps_that_go_nowhere_are_left_out():
+    found = vr.Candidates(vr.pipelines()["x3dom"], {"stepping.advance": ("add", "multiply", "parameter")})
+    assert [one.stepping.advance for one in found] == ["add"]

@@ -43,6 +43,7 @@ def run_new(options: argparse.Namespace) -> int:
         found = ask(base, stem.name, _Terminal(pictures, always=options.pictures).answer)
     else:
         found = from_file(base, stem.name, options.answers, pictures if options.pictures else None)
+    _warn(found)
     text = _json(found)
     if output is None:
         sys.stdout.write(text)
@@ -218,6 +219,18 @@ def _json(found: "Candidates") -> str:
     import json
 
     return json.dumps(found.as_dict(), indent=2) + "\n"
+
+
+def _warn(found: "Candidates") -> None:
+    """Say so at once where answers that do not go together leave nothing to draw."""
+    from volref.emulation.agreement import check_steps
+
+    if next(iter(found), None) is not None:
+        return
+    try:
+        check_steps(found.pipeline.stepping)
+    except SceneError as error:
+        note(f"written as answered, but emulate will refuse it: {error}")
 
 
 def _summary(found: "Candidates") -> str:

@@ -13,6 +13,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Self
 
+from volref.emulation.agreement import check_steps
 from volref.emulation.documents import read_record
 from volref.emulation.pipeline import GROUPS, Pipeline
 from volref.emulation.switches import Plain, switches_of
@@ -67,6 +68,7 @@ class Candidates:
                 changes.setdefault(group, {})[switch] = value
             try:
                 one = self.pipeline.with_switches(None, **changes)
+                check_steps(one.stepping)
             except SceneError:
                 continue
             yield one
