@@ -27,7 +27,7 @@ def separating_scene(pipeline: Pipeline) -> Scene:
     """Return a small scene on which choices differ: an artery in 11 slices, with what the pipeline can draw.
 
     Voxels of three lengths, an atlas that is neither square nor full, steep and flat places, values up to the
-    faces; a ball where meshes are drawn, lights where they are.
+    faces; a background that is half clear; a ball where meshes are drawn, lights where they are.
     """
     volume = vessel((26, 20, 11), spacing=(4.9, 4.8, 17.0), noise=0.0)
     colors = [(0.5, 0.2, 0.1), (0.9, 0.5, 0.3), (1.0, 0.9, 0.7)]
@@ -48,6 +48,7 @@ def separating_scene(pipeline: Pipeline) -> Scene:
         lights=(Light.directional((-1, 1, -1), (0.9, 0.9, 0.8)), Light.ambient((0.2, 0.2, 0.3)))
         if lit
         else (),
+        background=(0.1, 0.12, 0.2, 0.5),
         material=Material("phong", ambient=0.3, diffuse=0.7, specular=0.3, shininess=10.0) if lit else None,
     )
 
