@@ -16,14 +16,16 @@ from volref.formats import codes_of
 class Figures:
     """Figures of one target, or of several taken together.
 
-    error (n,): largest difference of a drawn pixel's channels, in 1/255 for targets of bytes; of floats beyond
-    1, which no screen shows but a formula that adds up to too much gives, in proportion to them.
+    error (n,): largest difference of a drawn pixel's channels, in 1/255 for targets of bytes; of floats
+    beyond 1, which no screen shows but a formula that adds up to too much gives, in proportion to them.
     unexplained: how many pixels are off by more than 1/255 and were not predicted to hang on a comparison.
+    colors: how many different ones the drawn pixels of real WebGL have; flat pictures agree without merit.
     """
 
     bytes: bool
     error: np.ndarray
     unexplained: int
+    colors: int
 
     @property
     def pixels(self) -> int:
@@ -78,7 +80,7 @@ def figures(
     error = np.where(np.isnan(apart), np.inf, apart).max(axis=-1)
     off = drawn & (error > (1 if whole else 1 / 255))
     unexplained = int((off & ~predicted()).sum()) if off.any() else 0
-    return Figures(whole, error[drawn], unexplained)
+    return Figures(whole, error[drawn], unexplained, len(np.unique(theirs[drawn], axis=0)))
 
 
 def together(parts: list[Figures]) -> Figures:
@@ -88,4 +90,5 @@ def together(parts: list[Figures]) -> Figures:
         parts[0].bytes,
         np.concatenate([part.error for part in parts]),
         sum(part.unexplained for part in parts),
+        max(part.colors for part in parts),
     )

@@ -24,6 +24,7 @@ def test_bytes_count_drawn_pixels_exact_ones_and_those_off_by_more_than_one():
     found = figures(ours, theirs, lambda: np.array([[False, False, False, True, False]]), (0.0, 0.0))
     assert (found.pixels, found.exact, found.off, found.unexplained) == (4, 0.25, 2, 1)
     assert found.error.tolist() == [0, 1, 2, 3]
+    assert found.colors == 4
 
 
 def test_floats_beyond_1_are_off_in_proportion():

@@ -9,12 +9,19 @@ from tests.webgl.cases import cases, compared
 EXACT = 0.995
 MEDIAN = 1e-6
 
+# A picture has more colours than this; the faintest one here has 19 in bytes.
+FLAT = 15
+
 
 @pytest.mark.parametrize("case", cases(), ids=str)
 def test_every_target_is_the_one_that_webgl_draws(webgl, case):
     for name, found in compared(webgl, case).items():
         said = f"{webgl.name}, {case}, {name}: {found}"
         print(said)
+        if name == "canvas":
+            # Front faces are clipped around an eye within the box: two passes draw nothing there.
+            blank = case.scene in ("inside", "radar inside") and case.described().rays.kind == "coordinates"
+            assert found.colors == 0 if blank else found.colors > FLAT, said
         assert found.unexplained == 0, said
         if found.bytes:
             assert found.exact >= EXACT, said
