@@ -16,10 +16,10 @@ import importlib
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from volref.emulation.candidates import Candidates, load_candidates
     from volref.emulation.catalogue import pipelines
     from volref.emulation.device import Device
-    from volref.emulation.documents import load_device, load_pipeline, pipeline_schema
+    from volref.emulation.files.candidates import Candidates, load_candidates
+    from volref.emulation.files.documents import load_device, load_pipeline, pipeline_schema
     from volref.emulation.passes import emulate
     from volref.emulation.pipeline import Pipeline
     from volref.emulation.result import Emulation
@@ -166,8 +166,8 @@ _HOMES = {
     "volref.emulation.catalogue": ("pipelines",),
     "volref.emulation.device": ("Device",),
     "volref.emulation.passes": ("emulate",),
-    "volref.emulation.candidates": ("Candidates", "load_candidates"),
-    "volref.emulation.documents": ("load_device", "load_pipeline", "pipeline_schema"),
+    "volref.emulation.files.candidates": ("Candidates", "load_candidates"),
+    "volref.emulation.files.documents": ("load_device", "load_pipeline", "pipeline_schema"),
     "volref.emulation.pipeline": ("Pipeline",),
     "volref.emulation.result": ("Emulation",),
     "volref.errors": ("FormatError", "SceneError"),

@@ -11,7 +11,7 @@ import volref as vr
 from tests.emulation.scenes import HEIGHT, WIDTH, example
 from volref.cli import main
 from volref.cli.pipelines import described
-from volref.emulation.asking import choices_of, known_of, matters, questions
+from volref.emulation.files.asking import choices_of, known_of, matters, questions
 
 
 def run(capsys, *words):
@@ -216,7 +216,7 @@ def test_a_file_that_is_there_is_kept_unless_told_otherwise(tmp_path, capsys):
 
 
 def test_every_need_names_switches_that_there_are():
-    from volref.emulation.asking import NEEDS
+    from volref.emulation.files.asking import NEEDS
 
     names = [question.name for question in questions()]
     assert set(NEEDS) <= set(names)

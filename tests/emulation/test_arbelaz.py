@@ -6,12 +6,12 @@ import pytest
 from tests.oracles.arbelaz import Pixel, Setting
 from volref import Camera, Mesh, Scene, TransferFunction, Volume, emulate
 from volref.emulation.catalogue import named
-from volref.emulation.composition import with_object
 from volref.emulation.device import Device
-from volref.emulation.opacity import factor_of
-from volref.emulation.packing import unpacked
-from volref.emulation.passes import prepare
-from volref.emulation.uploads import uploads_of
+from volref.emulation.drawing import prepare
+from volref.emulation.loop.opacity import factor_of
+from volref.emulation.surfaces.composition import with_object
+from volref.emulation.surfaces.packing import unpacked
+from volref.emulation.textures.uploads import uploads_of
 
 WIDTH, HEIGHT, STEPS = 20, 15, 25
 EXACT = Device.named("exact")

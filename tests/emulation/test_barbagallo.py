@@ -12,11 +12,12 @@ from volref import Camera, Scene, TransferFunction, Volume, emulate, render
 from volref.emulation.ambiguity import ambiguous
 from volref.emulation.catalogue import named
 from volref.emulation.device import Device
+from volref.emulation.drawing import prepare
+from volref.emulation.frames import drawn
 from volref.emulation.limit import limit_scene, refined, widened
-from volref.emulation.marching import march
-from volref.emulation.passes import drawn, prepare
-from volref.emulation.paths import Ends, paths_of
-from volref.emulation.uploads import uploads_of
+from volref.emulation.loop.marching import march
+from volref.emulation.rays.paths import Ends, paths_of
+from volref.emulation.textures.uploads import uploads_of
 
 NAMES = ("barbagallo", "barbagallo-article")
 COLORS = [(0.1, 0.2, 0.9), (0.1, 0.9, 1.0), (0.9, 0.7, 0.2), (1.0, 0.3, 0.1)]

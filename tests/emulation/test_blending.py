@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from volref.emulation.blending import blended, blended_codes
+from volref.emulation.targets.blending import blended, blended_codes
 
 STATES = ["none", "premultiplied", "straight", "additive-alpha"]
 codes = st.lists(st.integers(0, 255), min_size=4, max_size=4).map(lambda c: np.array([c], np.uint8))

@@ -5,7 +5,7 @@ import pytest
 
 from tests.emulation.scenes import radar_example
 from volref import Camera, Scene, TransferFunction, Volume
-from volref.emulation.box import CORNERS, box_of
+from volref.emulation.rays.box import CORNERS, box_of
 
 TRANSFER = TransferFunction.from_opacity([0, 255], [(1, 1, 1)] * 2, [0, 0.5])
 TURNED = np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))[0]

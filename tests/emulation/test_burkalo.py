@@ -9,9 +9,9 @@ from tests.oracles import burkalo as oracle
 from volref import Camera, Mesh, Scene, SceneError, TransferFunction, Volume, emulate, render
 from volref.emulation.catalogue import named
 from volref.emulation.device import Device
-from volref.emulation.marching import march
-from volref.emulation.passes import prepare
-from volref.emulation.uploads import uploads_of
+from volref.emulation.drawing import prepare
+from volref.emulation.loop.marching import march
+from volref.emulation.textures.uploads import uploads_of
 from volref.phantoms.specimens import vessel
 
 WIDTH, HEIGHT = 25, 18

@@ -8,7 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from volref import Camera, Pipeline, Scene, TransferFunction, Volume, emulate
-from volref.emulation.canvas import (
+from volref.emulation.device import Device
+from volref.emulation.groups import Accumulation, Output
+from volref.emulation.loop.marching import Marched
+from volref.emulation.targets.canvas import (
     cleared,
     draw,
     fragment_colors,
@@ -18,9 +21,6 @@ from volref.emulation.canvas import (
     store,
     tone_mapped,
 )
-from volref.emulation.device import Device
-from volref.emulation.groups import Accumulation, Output
-from volref.emulation.marching import Marched
 
 IDEAL = Device()
 MESA, SWIFT = Device.named("llvmpipe"), Device.named("swiftshader")

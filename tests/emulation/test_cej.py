@@ -11,14 +11,14 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 import volref as vr
 from tests.oracles.cej import Pixels, gradient_bytes
-from volref.emulation.box import box_of
-from volref.emulation.canvas import mean_of_frames
 from volref.emulation.catalogue import named
-from volref.emulation.gradient_volume import gradient_weights, unpacked, with_gradient
 from volref.emulation.groups import Lighting, Output
-from volref.emulation.noise import hash_jitter
-from volref.emulation.opacity import factor_of
-from volref.emulation.uploads import uploads_of
+from volref.emulation.loop.noise import hash_jitter
+from volref.emulation.loop.opacity import factor_of
+from volref.emulation.rays.box import box_of
+from volref.emulation.targets.canvas import mean_of_frames
+from volref.emulation.textures.gradient_volume import gradient_weights, unpacked, with_gradient
+from volref.emulation.textures.uploads import uploads_of
 
 EYE, TARGET, UP, FOV = (20.0, 14.0, 24.0), (3.5, 4.0, 6.0), (0.0, 1.0, 0.0), 30.0
 WORKING, PRINTED = named("cej2020"), named("cej2020-printed")

@@ -8,13 +8,13 @@ import pytest
 from tests.oracles import congote as oracle
 from tests.webgl.scenes import EXAMPLES
 from volref import Camera, RadarVolume, Scene, Sweep, TransferFunction, Volume, emulate
-from volref.emulation.box import box_of
 from volref.emulation.catalogue import named
 from volref.emulation.device import Device
-from volref.emulation.lookup import look_up, textures_of
-from volref.emulation.opacity import factor_of
-from volref.emulation.slices import slice_pair
-from volref.emulation.uploads import uploads_of
+from volref.emulation.loop.opacity import factor_of
+from volref.emulation.rays.box import box_of
+from volref.emulation.textures.lookup import look_up, textures_of
+from volref.emulation.textures.slices import slice_pair
+from volref.emulation.textures.uploads import uploads_of
 from volref.workspace import Workspace
 
 WIDTH, HEIGHT = 12, 9

@@ -8,7 +8,7 @@ from hypothesis import given
 import volref as vr
 from tests.emulation import strategies
 from volref.emulation.device import PRESETS, Device
-from volref.emulation.documents import device_from_dict
+from volref.emulation.files.documents import device_from_dict
 from volref.emulation.switches import switches_of
 
 

@@ -7,10 +7,10 @@ import pytest
 
 from tests.oracles.scalar import box_span, look_at_ray
 from volref import Camera, Pipeline, Scene, TransferFunction, Volume, emulate
-from volref.emulation.box import box_of
 from volref.emulation.device import Device
-from volref.emulation.entering import ends_of_rays, faces
-from volref.emulation.paths import vector_length
+from volref.emulation.rays.box import box_of
+from volref.emulation.rays.entering import ends_of_rays, faces
+from volref.emulation.rays.paths import vector_length
 
 IDEAL_DEVICE = Device()
 WIDTH, HEIGHT = 19, 14

@@ -7,8 +7,8 @@ import pytest
 
 from volref import Camera, Pipeline, Scene, TransferFunction, Volume
 from volref.emulation.device import Device
-from volref.emulation.lookup import look_up, mix, textures_of
-from volref.emulation.uploads import uploads_of
+from volref.emulation.textures.lookup import look_up, mix, textures_of
+from volref.emulation.textures.uploads import uploads_of
 from volref.workspace import Workspace
 
 CAMERA = Camera.look_at((3, 3, 30), (3, 3, 3), (0, 1, 0), 30, 1, 90)

@@ -9,11 +9,12 @@ from hypothesis import strategies as st
 
 from tests.emulation.scenes import HEIGHT, WIDTH, example, jitter_of, scene_for
 from volref import Camera, Pipeline, Scene, TransferFunction, Volume, emulate
-from volref.emulation import marching
 from volref.emulation.catalogue import pipelines
 from volref.emulation.device import Device
-from volref.emulation.marching import march
-from volref.emulation.passes import prepare, start_offsets
+from volref.emulation.drawing import prepare
+from volref.emulation.loop import marching
+from volref.emulation.loop.marching import march
+from volref.emulation.loop.offsets import start_offsets
 
 f32, f64 = np.float32, np.float64
 IDEAL = Device()

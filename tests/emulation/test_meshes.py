@@ -6,7 +6,7 @@ import pytest
 from volref import Camera, Mesh, Scene, SceneError, TransferFunction, Volume, emulate, render
 from volref.emulation.catalogue import named
 from volref.emulation.device import Device
-from volref.emulation.meshes import NOWHERE, distances, surfaces_of
+from volref.emulation.surfaces.meshes import NOWHERE, distances, surfaces_of
 from volref.phantoms.meshes import box_mesh, sphere_mesh
 
 CAMERA = Camera.look_at((1, 2, 20), (0, 0, 0), (0, 1, 0), 35, 5, 60)

@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 
 import volref as vr
-from volref.emulation.box import box_of
 from volref.emulation.catalogue import named
 from volref.emulation.device import Device
-from volref.emulation.entering import faces
-from volref.emulation.marching import Program, march
-from volref.emulation.mipmaps import classified_in_quads, level_of_detail, levels_of
-from volref.emulation.passes import prepare
-from volref.emulation.paths import paths_of
-from volref.emulation.quads import beyond, lanes_of, rays_in_quads
+from volref.emulation.drawing import prepare
+from volref.emulation.loop.marching import Program, march
+from volref.emulation.rays.box import box_of
+from volref.emulation.rays.entering import faces
+from volref.emulation.rays.paths import paths_of
+from volref.emulation.rays.quads import beyond, lanes_of, rays_in_quads
+from volref.emulation.textures.mipmaps import classified_in_quads, level_of_detail, levels_of
 from volref.stages.textures import Texture
 from volref.workspace import Workspace
 

@@ -6,11 +6,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from volref import Camera, Pipeline, Scene, TransferFunction, Volume, emulate
-from volref.emulation.box import box_of
 from volref.emulation.device import Device
-from volref.emulation.lookup import Found
-from volref.emulation.opacity import OpacityRule, factor_of
-from volref.emulation.passes import prepare
+from volref.emulation.drawing import prepare
+from volref.emulation.loop.opacity import OpacityRule, factor_of
+from volref.emulation.rays.box import box_of
+from volref.emulation.textures.lookup import Found
 
 EXACT = Device.named("exact")
 SIDES = (4.0, 6.0, 8.0)

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from volref.emulation.packing import packed, unpacked
+from volref.emulation.surfaces.packing import packed, unpacked
 from volref.formats import stored
 
 # Every number of 24 bits would be 16 million; each 97th, a prime, has all digits in all places.

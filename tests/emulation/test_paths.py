@@ -7,9 +7,9 @@ import pytest
 
 from tests.emulation.scenes import radar_example
 from volref import Camera, Pipeline, Scene, TransferFunction, Volume
-from volref.emulation.box import box_of
 from volref.emulation.device import Device
-from volref.emulation.paths import Ends, Paths, paths_of, vector_length, world_step_of
+from volref.emulation.rays.box import box_of
+from volref.emulation.rays.paths import Ends, Paths, paths_of, vector_length, world_step_of
 
 f32 = np.float32
 SPACING, SIZE = (0.5, 1.25, 2.0), (8, 6, 5)

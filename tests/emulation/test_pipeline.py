@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 import volref as vr
 from tests.emulation import strategies
 from volref.emulation.catalogue import MODULES
-from volref.emulation.documents import LARGEST_BYTES
+from volref.emulation.files.documents import LARGEST_BYTES
 from volref.emulation.pipeline import GROUPS, Pipeline
 from volref.emulation.switches import Word, switches_of
 

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from volref.emulation.groups import VolumeTexture
-from volref.emulation.slices import slice_pair
-from volref.emulation.uploads import atlas_of, tiles_of
+from volref.emulation.textures.slices import slice_pair
+from volref.emulation.textures.uploads import atlas_of, tiles_of
 from volref.stages.textures import Texture, fetch
 from volref.workspace import Workspace
 

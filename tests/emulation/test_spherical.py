@@ -7,14 +7,14 @@ from hypothesis import strategies as st
 
 from tests.oracles import polar
 from volref import Camera, RadarVolume, Scene, SceneError, Sweep, TransferFunction, Volume, emulate, render
-from volref.emulation.box import box_of
+from volref.emulation.agreement import check_drawable
 from volref.emulation.catalogue import named
 from volref.emulation.device import Device
 from volref.emulation.limit import limit_scene, refined
-from volref.emulation.lookup import look_up, textures_of
-from volref.emulation.passes import check_drawable
-from volref.emulation.spherical import spherical, sweep_pair
-from volref.emulation.uploads import uploads_of
+from volref.emulation.rays.box import box_of
+from volref.emulation.textures.lookup import look_up, textures_of
+from volref.emulation.textures.spherical import spherical, sweep_pair
+from volref.emulation.textures.uploads import uploads_of
 from volref.phantoms.storms import make_storm, radar_of_scan, sample_polar
 from volref.workspace import Workspace
 

@@ -10,7 +10,7 @@ from tests.emulation.scenes import JITTERED, example, jitter_of, scene_for
 from volref.emulation.catalogue import pipelines
 from volref.emulation.device import Device
 from volref.emulation.passes import emulate
-from volref.emulation.uploads import decoded_or, uploads_of
+from volref.emulation.textures.uploads import decoded_or, uploads_of
 
 PIXELS = ((0, 0), (8, 5), (11, 7))
 

@@ -10,8 +10,8 @@ from tests.emulation.scenes import radar_example
 from volref import Camera, Pipeline, Scene, TransferFunction, TransferFunction2D, Volume
 from volref.emulation.device import Device
 from volref.emulation.groups import TableTexture, VolumeTexture
-from volref.emulation.lookup import look_up, textures_of
-from volref.emulation.uploads import (
+from volref.emulation.textures.lookup import look_up, textures_of
+from volref.emulation.textures.uploads import (
     CANVAS_ROWS,
     atlas_of,
     baked_table,

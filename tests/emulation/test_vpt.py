@@ -9,9 +9,9 @@ from tests.oracles import vpt_program as oracle
 from volref import Camera, Scene, SceneError, TransferFunction, Volume, emulate
 from volref.emulation.catalogue import named
 from volref.emulation.device import Device
-from volref.emulation.opacity import factor_of
-from volref.emulation.passes import prepare
-from volref.emulation.uploads import uploads_of
+from volref.emulation.drawing import prepare
+from volref.emulation.loop.opacity import factor_of
+from volref.emulation.textures.uploads import uploads_of
 
 WIDTH, HEIGHT = 24, 18
 LOOK = ((26.0, -17.0, 22.0), (5.0, 6.0, 6.0), (0.1, 0.2, 1.0), 40.0, 12.0, 80.0)

@@ -10,9 +10,9 @@ from tests.oracles import x3dom_program as oracle
 from volref import Camera, Scene, TransferFunction, Volume, emulate
 from volref.emulation.catalogue import named
 from volref.emulation.device import Device
-from volref.emulation.opacity import factor_of
-from volref.emulation.passes import prepare
-from volref.emulation.uploads import uploads_of
+from volref.emulation.drawing import prepare
+from volref.emulation.loop.opacity import factor_of
+from volref.emulation.textures.uploads import uploads_of
 
 WIDTH, HEIGHT = 24, 18
 OUTSIDE = ((26.0, -17.0, 22.0), (5.0, 6.0, 6.0), (0.1, 0.2, 1.0), 40.0)

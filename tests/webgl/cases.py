@@ -13,10 +13,10 @@ from volref import Scene
 from volref.emulation.ambiguity import ambiguous
 from volref.emulation.catalogue import named
 from volref.emulation.device import Device
-from volref.emulation.meshes import NOWHERE
-from volref.emulation.packing import unpacked
 from volref.emulation.passes import emulate
 from volref.emulation.pipeline import Pipeline
+from volref.emulation.surfaces.meshes import NOWHERE
+from volref.emulation.surfaces.packing import unpacked
 
 
 @dataclass(frozen=True)
@@ -76,7 +76,9 @@ def compared(engine: Engine, case: Case) -> dict[str, Figures]:
     def predicted() -> np.ndarray:
         return ambiguous(scene, pipeline, device, jitter, frames)
 
-    cleared = dict.fromkeys(("canvas", "frame", "running_mean"), scene.background)
+    # A program that draws every pixel leaves black where a ray misses the box, whatever the background.
+    around = (0.0, 0.0, 0.0, 1.0) if pipeline.output.missed == "black" else scene.background
+    cleared = dict.fromkeys(("canvas", "frame", "running_mean"), around)
     cleared["mesh_distance"] = (NOWHERE,)
     nothing = (0.0,)
     for images in (ours, theirs):

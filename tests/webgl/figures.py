@@ -11,6 +11,9 @@ import numpy as np
 
 from volref.formats import codes_of
 
+# A tone map of nothing may be a few 1e-18.
+NOTHING = 1e-12
+
 
 @dataclass(frozen=True)
 class Figures:
@@ -70,7 +73,8 @@ def figures(
     empty = np.asarray(cleared, np.float32)
     if whole:
         ours, empty = codes_of(ours), codes_of(empty)
-    drawn = ((ours != empty) | (theirs != empty)).any(axis=-1)
+    held = [np.abs(image.astype(np.float64) - empty) <= NOTHING for image in (ours, theirs)]
+    drawn = ~(held[0] & held[1]).all(axis=-1)
     with np.errstate(invalid="ignore"):
         apart = np.abs(ours.astype(np.float64) - theirs.astype(np.float64))
     if not whole:

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from tests.webgl.computing import computed
-from volref.emulation.angles import arccosine, arctangent
 from volref.emulation.device import Device
+from volref.emulation.textures.angles import arccosine, arctangent
 
 POINTS = 4096
 

@@ -10,8 +10,8 @@ from tests.webgl.systems.cej import SYSTEM, draw, gradient_volume
 from volref.emulation.ambiguity import ambiguous
 from volref.emulation.catalogue import named
 from volref.emulation.device import Device
-from volref.emulation.gradient_volume import with_gradient
 from volref.emulation.passes import emulate
+from volref.emulation.textures.gradient_volume import with_gradient
 
 
 @pytest.mark.parametrize("name", SYSTEM.pipelines)

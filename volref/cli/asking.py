@@ -12,8 +12,8 @@ from volref.cli.verb import GOOD
 from volref.errors import FormatError, SceneError
 
 if TYPE_CHECKING:
-    from volref.emulation.asking import Question
-    from volref.emulation.candidates import Candidates
+    from volref.emulation.files.asking import Question
+    from volref.emulation.files.candidates import Candidates
     from volref.emulation.pipeline import Pipeline
     from volref.emulation.switches import Plain
     from volref.scene import Scene
@@ -57,8 +57,8 @@ def ask(
     base: "Pipeline", name: str, answer: "Callable[[Question, Plain, Pipeline], tuple[Plain, ...]]"
 ) -> "Candidates":
     """Return the set of pipelines that answers make of a base; questions that do not matter are left out."""
-    from volref.emulation.asking import known_of, matters, questions
-    from volref.emulation.candidates import Candidates
+    from volref.emulation.files.asking import known_of, matters, questions
+    from volref.emulation.files.candidates import Candidates
 
     pipeline, known = base.with_switches(name), known_of(base)
     for question in questions():
@@ -79,8 +79,8 @@ def from_file(base: "Pipeline", name: str, path: str, pictures: "_Pictures | Non
     FormatError
         If the file is no table of answers, or an answer is none to its question.
     """
-    from volref.emulation.asking import answered, questions
-    from volref.emulation.documents import read_record
+    from volref.emulation.files.asking import answered, questions
+    from volref.emulation.files.documents import read_record
     from volref.emulation.switches import checked_keys
 
     names = [question.name for question in questions()]
@@ -119,7 +119,7 @@ class _Terminal:
 
     def answer(self, question: "Question", default: "Plain", pipeline: "Pipeline") -> "tuple[Plain, ...]":
         """Put one question until it is answered."""
-        from volref.emulation.asking import answered
+        from volref.emulation.files.asking import answered
 
         self.count += 1
         print(f"\n{_posed(self.count, question, default)}", file=sys.stderr)
@@ -153,7 +153,7 @@ class _Pictures:
 
     def of(self, question: "Question", default: "Plain", pipeline: "Pipeline") -> None:
         """Draw and write one."""
-        from volref.emulation.asking import choices_of
+        from volref.emulation.files.asking import choices_of
         from volref.io.png import write_png
         from volref.report.choices import choice_sheet
 
@@ -174,7 +174,7 @@ def _around(default: "Plain") -> "list[Plain]":
 
 
 def _posed(number: int, question: "Question", default: "Plain") -> str:
-    from volref.emulation.asking import choices_of
+    from volref.emulation.files.asking import choices_of
     from volref.emulation.switches import Word
 
     rule = question.switch.rule

@@ -11,7 +11,7 @@ from volref.cli.programs import is_file, pipeline_at
 from volref.cli.verb import DIFFERS, GOOD, Verb
 
 if TYPE_CHECKING:
-    from volref.emulation.candidates import Candidates
+    from volref.emulation.files.candidates import Candidates
     from volref.emulation.pipeline import Pipeline
     from volref.emulation.switches import Plain
 
@@ -99,7 +99,7 @@ def _show(options: argparse.Namespace) -> int:
 def described(found: "Candidates") -> dict[str, Any]:
     """Return every switch of a program: value, meaning, default, and the value of its sibling."""
     from volref import pipelines
-    from volref.emulation.asking import questions
+    from volref.emulation.files.asking import questions
     from volref.emulation.switches import Word
 
     pipeline = found.pipeline
@@ -135,7 +135,7 @@ def _line(row: dict[str, Any], beside: str | None) -> str:
 
 
 def _diff(options: argparse.Namespace) -> int:
-    from volref.emulation.asking import questions
+    from volref.emulation.files.asking import questions
 
     one, other = (pipeline_at(text) for text in (options.one, options.other))
     rows = []

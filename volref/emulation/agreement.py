@@ -4,13 +4,16 @@ A scene that asks for nothing, which is what its defaults are, takes what the pr
 """
 
 from volref.emulation.device import Device
-from volref.emulation.gradient_volume import has_gradient_volume
 from volref.emulation.groups import Stepping
 from volref.emulation.pipeline import Pipeline
+from volref.emulation.textures.gradient_volume import has_gradient_volume
+from volref.emulation.textures.radar_image import check_spherical, is_spherical
 from volref.errors import SceneError
+from volref.scene.radar import RadarVolume
 from volref.scene.scene import Scene
 from volref.scene.transfer import TransferFunction
 from volref.scene.transfer2d import TransferFunction2D
+from volref.scene.volume import Volume
 
 # Ends that a program tests by the position of its next sample, or by the parameter t, have to move it.
 MOVED_BY = {"parameter": ("parameter",), "outside": ("add",), "outside-above": ("add", "multiply")}
@@ -89,3 +92,21 @@ def check_steps(stepping: Stepping) -> None:
     if stepping.end == "outside-above" and stepping.cap is None:
         message = "pipeline.stepping.cap must be given for end 'outside-above', got None; "
         raise SceneError(message + "rays through the faces at 0 end by it alone")
+
+
+def check_drawable(scene: Scene, pipeline: Pipeline) -> None:
+    """Refuse scenes that hold what no program here draws."""
+    wanted = RadarVolume if is_spherical(pipeline.volume) else Volume
+    if not isinstance(scene.volume, wanted):
+        message = f"scene.volume must be a {wanted.__name__} for pipeline {pipeline.name!r}, got "
+        message += f"{'none' if scene.volume is None else type(scene.volume).__name__}; "
+        cure = (
+            "choose a pipeline for grids" if wanted is RadarVolume else "choose one for radars, or resample"
+        )
+        raise SceneError(message + f"give one, or {cure}")
+    if wanted is RadarVolume:
+        check_spherical(pipeline)
+    if scene.mode != "composite" or scene.clip:
+        got = "clipping planes" if scene.clip else f"mode {scene.mode!r}"
+        message = f"scene must be a composite without clipping planes to be emulated, got {got}; "
+        raise SceneError(message + "leave it out")

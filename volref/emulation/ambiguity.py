@@ -17,12 +17,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from volref.arrays import Booleans, Floats
-from volref.emulation.box import box_of
 from volref.emulation.device import Device
+from volref.emulation.drawing import prepare
 from volref.emulation.groups import Stepping
-from volref.emulation.passes import emulate, prepare
-from volref.emulation.paths import vector_length, world_step_of
+from volref.emulation.passes import emulate
 from volref.emulation.pipeline import Pipeline
+from volref.emulation.rays.box import box_of
+from volref.emulation.rays.paths import vector_length, world_step_of
 from volref.emulation.switches import Plain
 from volref.scene.camera import Camera
 from volref.scene.scene import Scene

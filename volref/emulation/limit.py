@@ -15,15 +15,15 @@ The last three have one extinction for all rays only where that length is the sa
 import numpy as np
 
 from volref.arrays import Floats
-from volref.emulation.box import Box, box_of
 from volref.emulation.device import Device
-from volref.emulation.opacity import factor_of
-from volref.emulation.passes import prepare
-from volref.emulation.paths import world_step_of
+from volref.emulation.drawing import prepare
+from volref.emulation.loop.opacity import factor_of
 from volref.emulation.pipeline import Pipeline
-from volref.emulation.radar_image import polar_image, uploaded_radar
+from volref.emulation.rays.box import Box, box_of
+from volref.emulation.rays.paths import world_step_of
 from volref.emulation.switches import Plain
-from volref.emulation.uploads import Uploads, table_texture, uploads_of
+from volref.emulation.textures.radar_image import polar_image, uploaded_radar
+from volref.emulation.textures.uploads import Uploads, table_texture, uploads_of
 from volref.errors import SceneError
 from volref.formats import stored
 from volref.scene.radar import RadarVolume

@@ -11,24 +11,19 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from volref.arrays import Floats, Indices, Numbers, whole_number
-from volref.emulation.canvas import cleared, fragment_colors
 from volref.emulation.catalogue import named
 from volref.emulation.device import Device
-from volref.emulation.endings import quad_of, why_ended
-from volref.emulation.lookup import Textures, look_up
-from volref.emulation.marching import Program, Sample, march
-from volref.emulation.passes import (
-    Drawing,
-    lanes_of_rays,
-    last_targets,
-    march_frame,
-    prepare,
-    start_offsets,
-)
+from volref.emulation.drawing import Drawing, prepare
+from volref.emulation.frames import lanes_of_rays, last_targets, march_frame
+from volref.emulation.loop.endings import quad_of, why_ended
+from volref.emulation.loop.marching import Program, Sample, march
+from volref.emulation.loop.offsets import start_offsets
 from volref.emulation.pipeline import Pipeline
-from volref.emulation.slices import slice_pair
-from volref.emulation.spherical import sweep_pair
-from volref.emulation.uploads import table_place
+from volref.emulation.targets.canvas import cleared, fragment_colors
+from volref.emulation.textures.lookup import Textures, look_up
+from volref.emulation.textures.slices import slice_pair
+from volref.emulation.textures.spherical import sweep_pair
+from volref.emulation.textures.uploads import table_place
 from volref.formats import codes_of
 from volref.scene.scene import Scene
 from volref.stages.textures import footprint

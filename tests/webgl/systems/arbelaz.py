@@ -19,10 +19,10 @@ from tests.webgl.systems.common import (
     volume_upload,
 )
 from volref import Mesh, Scene
-from volref.emulation.box import CORNERS, box_of
-from volref.emulation.opacity import factor_of
+from volref.emulation.loop.opacity import factor_of
 from volref.emulation.pipeline import Pipeline
-from volref.emulation.uploads import uploads_of
+from volref.emulation.rays.box import CORNERS, box_of
+from volref.emulation.textures.uploads import uploads_of
 
 EMPTY = (0.0, 0.0, 0.0, 0.0)
 

@@ -14,10 +14,10 @@ from tests.webgl.systems.common import (
     target_of,
 )
 from volref import Scene
-from volref.emulation.box import box_of
-from volref.emulation.opacity import factor_of
+from volref.emulation.loop.opacity import factor_of
 from volref.emulation.pipeline import Pipeline
-from volref.emulation.uploads import Uploads, uploads_of
+from volref.emulation.rays.box import box_of
+from volref.emulation.textures.uploads import Uploads, uploads_of
 
 EMPTY = (0.0, 0.0, 0.0, 0.0)
 

@@ -17,10 +17,10 @@ from tests.webgl.systems.common import (
     texture,
 )
 from volref import Light, Material, Scene
-from volref.emulation.box import box_of
-from volref.emulation.opacity import factor_of
+from volref.emulation.loop.opacity import factor_of
 from volref.emulation.pipeline import Pipeline
-from volref.emulation.uploads import uploads_of
+from volref.emulation.rays.box import box_of
+from volref.emulation.textures.uploads import uploads_of
 from volref.formats import codes_of
 
 KINDS = {"ambient": 0, "point": 1, "directional": 2}

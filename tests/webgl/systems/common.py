@@ -11,9 +11,9 @@ import numpy as np
 
 from tests.webgl.engine import CANVAS, Engine, Geometry, Job, Pass, Program, Target, Texture
 from volref import Mesh, Scene
-from volref.emulation.box import CORNERS, box_of
 from volref.emulation.pipeline import Pipeline
-from volref.emulation.uploads import Uploads
+from volref.emulation.rays.box import CORNERS, box_of
+from volref.emulation.textures.uploads import Uploads
 
 # The last target, in bytes or floats; the real canvas has bytes only.
 IMAGE = "image"

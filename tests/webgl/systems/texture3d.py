@@ -18,11 +18,11 @@ from tests.webgl.systems.common import (
     volume_upload,
 )
 from volref import Scene
-from volref.emulation.box import box_of
-from volref.emulation.meshes import NOWHERE
-from volref.emulation.paths import world_step_of
 from volref.emulation.pipeline import Pipeline
-from volref.emulation.uploads import uploads_of
+from volref.emulation.rays.box import box_of
+from volref.emulation.rays.paths import world_step_of
+from volref.emulation.surfaces.meshes import NOWHERE
+from volref.emulation.textures.uploads import uploads_of
 
 
 def draw(

@@ -16,10 +16,10 @@ from tests.webgl.systems.common import (
     volume_upload,
 )
 from volref import Scene
-from volref.emulation.box import box_of
-from volref.emulation.opacity import factor_of
+from volref.emulation.loop.opacity import factor_of
 from volref.emulation.pipeline import Pipeline
-from volref.emulation.uploads import uploads_of
+from volref.emulation.rays.box import box_of
+from volref.emulation.textures.uploads import uploads_of
 
 ALPHA = {"one": "1.0", "accumulated": "sum.a"}
 

@@ -13,10 +13,10 @@ operation by operation as the shaders do.  R rays, of all pixels.
 import numpy as np
 
 from volref.arrays import Floats
-from volref.emulation.box import Box
 from volref.emulation.device import Device
-from volref.emulation.lookup import mix
-from volref.emulation.paths import Ends
+from volref.emulation.rays.box import Box
+from volref.emulation.rays.paths import Ends
+from volref.emulation.textures.lookup import mix
 from volref.scene.scene import Scene
 from volref.stages.rays import pixel_ndc
 

@@ -6,11 +6,11 @@ F fragments; colours are (F, 4), the canvas is (H * W, 4).
 import numpy as np
 
 from volref.arrays import Booleans, Bytes, Floats, Indices
-from volref.emulation.blending import blended, blended_codes
 from volref.emulation.device import Device
 from volref.emulation.groups import Accumulation, Output
-from volref.emulation.lookup import mix
-from volref.emulation.marching import Marched
+from volref.emulation.loop.marching import Marched
+from volref.emulation.targets.blending import blended, blended_codes
+from volref.emulation.textures.lookup import mix
 from volref.formats import codes_of, decoded, stored
 from volref.scene.scene import RGBA, Scene
 from volref.tonemap import OPERATORS

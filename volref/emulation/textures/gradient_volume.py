@@ -15,7 +15,7 @@ import numpy as np
 
 from volref.arrays import Floats, Integers, Numbers
 from volref.emulation.groups import Lighting
-from volref.emulation.paths import vector_length
+from volref.emulation.rays.paths import vector_length
 from volref.formats import stored
 from volref.stages.gradients import cej_kernels, differentiated, sobel_kernels
 

@@ -17,10 +17,10 @@ import numpy as np
 
 from volref.arrays import Floats, Numbers
 from volref.emulation.device import Device
-from volref.emulation.gradient_volume import SOBEL_GAIN, has_gradient_volume, with_gradient
 from volref.emulation.groups import TableTexture, VolumeTexture
 from volref.emulation.pipeline import Pipeline
-from volref.emulation.radar_image import PolarGrid, polar_grid, polar_image
+from volref.emulation.textures.gradient_volume import SOBEL_GAIN, has_gradient_volume, with_gradient
+from volref.emulation.textures.radar_image import PolarGrid, polar_grid, polar_image
 from volref.formats import codes_of, decoded, stored
 from volref.image import decode_srgb, encode_srgb
 from volref.scene.radar import RadarVolume

@@ -14,7 +14,7 @@ from types import MappingProxyType
 from typing import Any, Self
 
 from volref.emulation.agreement import check_steps
-from volref.emulation.documents import read_record
+from volref.emulation.files.documents import read_record
 from volref.emulation.pipeline import GROUPS, Pipeline
 from volref.emulation.switches import Plain, switches_of
 from volref.errors import SceneError

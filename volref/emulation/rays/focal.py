@@ -9,9 +9,9 @@ All is computed in the control type, operation by operation as a shader does.  R
 import numpy as np
 
 from volref.arrays import Floats
-from volref.emulation.box import Box
 from volref.emulation.device import Device
-from volref.emulation.paths import Ends, vector_length
+from volref.emulation.rays.box import Box
+from volref.emulation.rays.paths import Ends, vector_length
 from volref.errors import SceneError
 from volref.scene.scene import Scene
 from volref.scene.transform import transform_points

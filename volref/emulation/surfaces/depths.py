@@ -14,15 +14,15 @@ import dataclasses
 import numpy as np
 
 from volref.arrays import Floats, Integers
-from volref.emulation.box import Box
-from volref.emulation.canvas import store
 from volref.emulation.device import Device
-from volref.emulation.entering import faces
-from volref.emulation.marching import Cut
-from volref.emulation.meshes import NOWHERE, Surfaces, distances
-from volref.emulation.packing import packed, unpacked
-from volref.emulation.paths import Ends
+from volref.emulation.loop.marching import Cut
 from volref.emulation.pipeline import Pipeline
+from volref.emulation.rays.box import Box
+from volref.emulation.rays.entering import faces
+from volref.emulation.rays.paths import Ends
+from volref.emulation.surfaces.meshes import NOWHERE, Surfaces, distances
+from volref.emulation.surfaces.packing import packed, unpacked
+from volref.emulation.targets.canvas import store
 from volref.scene.scene import Scene
 from volref.scene.transform import transform_points
 from volref.stages.raster import Fragments

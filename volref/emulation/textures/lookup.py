@@ -10,13 +10,13 @@ import numpy as np
 
 from volref.arrays import Floats
 from volref.emulation.device import Device
-from volref.emulation.gradient_volume import has_gradient_volume, unpacked
-from volref.emulation.mipmaps import classified_in_quads, levels_of
 from volref.emulation.pipeline import Pipeline
-from volref.emulation.radar_image import PolarGrid
-from volref.emulation.slices import SlicePair, slice_pair
-from volref.emulation.spherical import sweep_pair
-from volref.emulation.uploads import Uploads, table_place, table_texture, volume_texture
+from volref.emulation.textures.gradient_volume import has_gradient_volume, unpacked
+from volref.emulation.textures.mipmaps import classified_in_quads, levels_of
+from volref.emulation.textures.radar_image import PolarGrid
+from volref.emulation.textures.slices import SlicePair, slice_pair
+from volref.emulation.textures.spherical import sweep_pair
+from volref.emulation.textures.uploads import Uploads, table_place, table_texture, volume_texture
 from volref.stages.textures import Texture, fetch, fetch_slices
 from volref.workspace import Workspace
 

@@ -9,10 +9,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from volref.arrays import Floats, Indices, Integers
-from volref.emulation.box import Box
 from volref.emulation.device import Device
 from volref.emulation.groups import Stepping
 from volref.emulation.pipeline import Pipeline
+from volref.emulation.rays.box import Box
 from volref.scene.radar import RadarVolume
 from volref.scene.scene import Scene
 from volref.scene.volume import Volume

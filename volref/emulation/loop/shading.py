@@ -1,4 +1,4 @@
-"""What lights make of the colours of samples: shaders for the loop of `volref.emulation.marching`.
+"""What lights make of the colours of samples: shaders for the loop of `volref.emulation.loop.marching`.
 
 n samples, R rays; positions, gradients and colours are (3, n) or (4, n) in the device's type of values.
 
@@ -17,12 +17,12 @@ from functools import partial
 import numpy as np
 
 from volref.arrays import Floats, Indices
-from volref.emulation.box import Box
-from volref.emulation.gradient_volume import has_gradient_volume
-from volref.emulation.lookup import Found, Textures, look_up
-from volref.emulation.marching import Shader
-from volref.emulation.paths import Ends
+from volref.emulation.loop.marching import Shader
 from volref.emulation.pipeline import Pipeline
+from volref.emulation.rays.box import Box
+from volref.emulation.rays.paths import Ends
+from volref.emulation.textures.gradient_volume import has_gradient_volume
+from volref.emulation.textures.lookup import Found, Textures, look_up
 from volref.errors import SceneError
 from volref.scene.lights import Light, Material
 from volref.scene.scene import Scene

@@ -6,12 +6,12 @@ F fragments, R rays.  The coordinate targets of two passes are (H, W, 3), in the
 import numpy as np
 
 from volref.arrays import Floats
-from volref.emulation.box import CORNERS, Box
 from volref.emulation.device import Device
-from volref.emulation.focal import focal_ends
-from volref.emulation.paths import Ends, vector_length
 from volref.emulation.pipeline import Pipeline
-from volref.emulation.unprojecting import unprojected_ends
+from volref.emulation.rays.box import CORNERS, Box
+from volref.emulation.rays.focal import focal_ends
+from volref.emulation.rays.paths import Ends, vector_length
+from volref.emulation.rays.unprojecting import unprojected_ends
 from volref.formats import stored
 from volref.scene.camera import Camera
 from volref.scene.scene import Scene

@@ -13,10 +13,10 @@ import numpy as np
 
 from volref.arrays import Booleans, Floats, Indices, Integers
 from volref.emulation.groups import Stepping
-from volref.emulation.lookup import Found, Textures, look_up, mix
-from volref.emulation.mipmaps import LANES
-from volref.emulation.opacity import OpacityRule
-from volref.emulation.paths import Paths
+from volref.emulation.loop.opacity import OpacityRule
+from volref.emulation.rays.paths import Paths
+from volref.emulation.textures.lookup import Found, Textures, look_up, mix
+from volref.emulation.textures.mipmaps import LANES
 from volref.errors import SceneError
 from volref.workspace import Workspace
 

@@ -6,7 +6,7 @@ from functools import cached_property
 import numpy as np
 
 from volref.arrays import Floats, Integers
-from volref.emulation.radar_image import reach
+from volref.emulation.textures.radar_image import reach
 from volref.scene.radar import RadarVolume
 from volref.scene.scene import Scene
 from volref.scene.transform import affine, invert_affine

@@ -10,8 +10,8 @@ import operator
 import numpy as np
 
 from volref.arrays import Indices
-from volref.emulation.marching import LONGEST_LOOP, Marched, Program, march
-from volref.emulation.mipmaps import LANES
+from volref.emulation.loop.marching import LONGEST_LOOP, Marched, Program, march
+from volref.emulation.textures.mipmaps import LANES
 
 
 def why_ended(program: Program, marched: Marched, ray: int) -> str:

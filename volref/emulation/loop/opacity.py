@@ -15,11 +15,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from volref.arrays import Floats, Indices
-from volref.emulation.box import Box
 from volref.emulation.device import Device
-from volref.emulation.lookup import Found
-from volref.emulation.paths import Paths
 from volref.emulation.pipeline import Pipeline
+from volref.emulation.rays.box import Box
+from volref.emulation.rays.paths import Paths
+from volref.emulation.textures.lookup import Found
 from volref.scene.scene import Scene
 
 

@@ -11,12 +11,12 @@ from typing import NamedTuple
 import numpy as np
 
 from volref.arrays import Booleans, Floats, Indices, Integers
-from volref.emulation.box import CORNERS, Box
 from volref.emulation.device import Device
-from volref.emulation.entering import faces, read_target
-from volref.emulation.mipmaps import LANES
-from volref.emulation.paths import Ends
 from volref.emulation.pipeline import Pipeline
+from volref.emulation.rays.box import CORNERS, Box
+from volref.emulation.rays.entering import faces, read_target
+from volref.emulation.rays.paths import Ends
+from volref.emulation.textures.mipmaps import LANES
 from volref.errors import SceneError
 from volref.scene.scene import Scene
 from volref.stages.raster import Fragments

@@ -17,11 +17,11 @@ is 0.
 import numpy as np
 
 from volref.arrays import Booleans, Floats
-from volref.emulation.angles import arccosine, arctangent
 from volref.emulation.device import Device
 from volref.emulation.groups import VolumeTexture
-from volref.emulation.radar_image import PolarGrid
-from volref.emulation.slices import SlicePair, in_atlas
+from volref.emulation.textures.angles import arccosine, arctangent
+from volref.emulation.textures.radar_image import PolarGrid
+from volref.emulation.textures.slices import SlicePair, in_atlas
 
 
 def spherical(position: Floats, device: Device, *, printed: bool) -> tuple[Floats, Floats, Floats]:

@@ -1,0 +1,1 @@
+"""Opaque meshes: their targets, and how they meet the volume."""

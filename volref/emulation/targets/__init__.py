@@ -1,0 +1,1 @@
+"""From the colour of the loop to the canvas."""
