@@ -69,21 +69,24 @@ def compared(engine: Engine, case: Case) -> dict[str, Figures]:
     """Figures of every target."""
     scene, pipeline, device = EXAMPLES[case.scene].make(), case.described(), Device.named(engine.name)
     jitter, frames = jitter_of(case.system, scene), case.system.frames
-    ours = dict(emulate(scene, pipeline, device, jitter, frames).passes)
+    emulated = emulate(scene, pipeline, device, jitter, frames)
+    ours = dict(emulated.passes)
+    # A program that draws every pixel has black ones, equal without merit, where rays miss the box.
+    met = None if pipeline.output.missed == "clear" else emulated.samples > 0
     theirs = case.system.draw(engine, scene, pipeline, jitter=jitter, frames=frames)
     assert set(theirs) == set(ours), f"emulated {sorted(ours)}, drawn {sorted(theirs)}"
 
     def predicted() -> np.ndarray:
         return ambiguous(scene, pipeline, device, jitter, frames)
 
-    # A program that draws every pixel leaves black where a ray misses the box, whatever the background.
-    around = (0.0, 0.0, 0.0, 1.0) if pipeline.output.missed == "black" else scene.background
-    cleared = dict.fromkeys(("canvas", "frame", "running_mean"), around)
+    cleared = dict.fromkeys(("canvas", "frame", "running_mean"), scene.background)
     cleared["mesh_distance"] = (NOWHERE,)
     nothing = (0.0,)
     for images in (ours, theirs):
         images |= {name: as_numbers(images[name], pipeline) for name in ours if name.endswith("_depth")}
-    return {name: figures(ours[name], theirs[name], predicted, cleared.get(name, nothing)) for name in ours}
+    return {
+        name: figures(ours[name], theirs[name], predicted, cleared.get(name, nothing), met) for name in ours
+    }
 
 
 def as_numbers(target: np.ndarray, pipeline: Pipeline) -> np.ndarray:

@@ -11,9 +11,6 @@ import numpy as np
 
 from volref.formats import codes_of
 
-# A tone map of nothing may be a few 1e-18.
-NOTHING = 1e-12
-
 
 @dataclass(frozen=True)
 class Figures:
@@ -61,20 +58,24 @@ class Figures:
 
 
 def figures(
-    ours: np.ndarray, theirs: np.ndarray, predicted: Callable[[], np.ndarray], cleared: Sequence[float]
+    ours: np.ndarray,
+    theirs: np.ndarray,
+    predicted: Callable[[], np.ndarray],
+    cleared: Sequence[float],
+    met: np.ndarray | None = None,
 ) -> Figures:
     """Figures of one target: emulated floats (..., C), and bytes or floats (..., C) of real WebGL.
 
     predicted: which pixels (H, W) hang on a comparison, asked only if one is off by more than 1/255.
     cleared: the colour (C,) or (1,) before anything was drawn.
+    met (H, W): pixels that count in its stead, with all that are off.
     """
     assert ours.shape == theirs.shape, f"emulated {ours.shape}, drawn {theirs.shape}"
     whole = theirs.dtype == np.uint8
     empty = np.asarray(cleared, np.float32)
     if whole:
         ours, empty = codes_of(ours), codes_of(empty)
-    held = [np.abs(image.astype(np.float64) - empty) <= NOTHING for image in (ours, theirs)]
-    drawn = ~(held[0] & held[1]).all(axis=-1)
+    drawn = ((ours != empty) | (theirs != empty)).any(axis=-1)
     with np.errstate(invalid="ignore"):
         apart = np.abs(ours.astype(np.float64) - theirs.astype(np.float64))
     if not whole:
@@ -82,7 +83,9 @@ def figures(
     # NaN is equal to NaN and infinitely far from numbers; so is an infinity, and equal to itself.
     apart = np.where((ours == theirs) | (np.isnan(ours) & np.isnan(theirs)), 0.0, apart)
     error = np.where(np.isnan(apart), np.inf, apart).max(axis=-1)
-    off = drawn & (error > (1 if whole else 1 / 255))
+    far = error > (1 if whole else 1 / 255)
+    drawn = drawn if met is None else met | far
+    off = drawn & far
     unexplained = int((off & ~predicted()).sum()) if off.any() else 0
     return Figures(whole, error[drawn], unexplained, len(np.unique(theirs[drawn], axis=0)))
 

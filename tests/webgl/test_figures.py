@@ -52,6 +52,12 @@ def test_a_background_that_both_left_alone_does_not_count():
     assert figures(held.astype(np.float64), held, never, (0.1,)).pixels == 0
 
 
+def test_pixels_that_no_ray_met_do_not_count_unless_they_are_off():
+    ours, theirs = image((0.5,), (1.0,), (1.0,)), image((0.5,), (1.0,), (0.5,)).astype(np.float32)
+    found = figures(ours, theirs, lambda: np.zeros((1, 3), bool), (0.0,), np.array([[True, False, False]]))
+    assert (found.pixels, found.off, found.unexplained) == (2, 1, 1)
+
+
 def test_percentiles_are_of_all_pixels_taken_together():
     apart = [0.0, 0.0, 2.0**-9]
     parts = [figures(image((1.0,)), image((1.0 - e,)).astype(np.float32), never, (0.0,)) for e in apart]
