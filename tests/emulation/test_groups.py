@@ -114,8 +114,8 @@ SHOWN = {
     "device.subpixel_bits": ("congote2012", {}, "plain"),
 }
 
-# Switches and values that change nothing that is drawn; each is to go or to be modelled.
-WITHOUT_EFFECT = {"volume.channel=alpha", "device.fragment_color=float64"}
+# What says where a value lies in an uploaded image, and changes nothing that is drawn from it.
+WITHOUT_EFFECT = {"volume.channel=alpha"}
 
 # Values of which the default, or they themselves, are refused with what shows them.
 REFUSING = {

@@ -60,10 +60,10 @@ BROKEN = {
         {"stpes": 3},
         r"pipeline.stepping must have switches it knows, got 'stpes'; use one of rule",
     ),
-    "table": ({"size": 1}, r"table_texture.size must be a whole number from 2 to 65536, got 1"),
-    "opacity": ({"factor": -1}, r"sample_opacity.factor must be at least 0, got -1"),
-    "accumulation": ({"normalize": 1}, r"accumulation.normalize must be true or false, got 1"),
-    "meshes": ({"kind": "depths"}, r"mesh_cut.kind must be"),
+    "table": ({"size": 1}, r"pipeline.table.size must be a whole number from 2 to 65536, got 1"),
+    "opacity": ({"factor": -1}, r"pipeline.opacity.factor must be at least 0, got -1"),
+    "accumulation": ({"normalize": 1}, r"pipeline.accumulation.normalize must be true or false, got 1"),
+    "meshes": ({"kind": "depths"}, r"pipeline.meshes.kind must be"),
     "lightning": ({}, r"pipeline must have switches it knows, got 'lightning'"),
 }
 
@@ -108,7 +108,7 @@ def test_the_schema_accepts_a_switch_just_where_the_program_does(switch, value):
 
 
 def test_the_three_numbers_of_the_tone_map_and_the_ends_of_the_domain_rise():
-    with pytest.raises(vr.SceneError, match=r"output.low, mid and high must rise, got 0, 2 and 1; sort them"):
+    with pytest.raises(vr.SceneError, match=r"output.low, mid and high must rise, got 0, 2, 1; sort them"):
         Pipeline("x").with_switches(output={"mid": 2.0})
     with pytest.raises(vr.SceneError, match=r"pipeline.domain"):
         Pipeline("x", domain=(2.0, 1.0))

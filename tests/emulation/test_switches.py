@@ -10,7 +10,7 @@ from volref.emulation.switches import Flag, Real, Switches, Whole, Word, check_h
 
 
 @dataclass(frozen=True)
-class HotPlate(Switches):
+class HotPlate(Switches, group="hot_plate"):
     """A record of one switch of each kind."""
 
     label: str = "plate"

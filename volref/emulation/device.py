@@ -23,7 +23,7 @@ ARITHMETIC = {
 
 
 @dataclass(frozen=True)
-class Device(Switches):
+class Device(Switches, group="device"):
     """How one machine computes; the default is ideal but for the float32 that decides on counts of samples.
 
     Examples
@@ -104,7 +104,11 @@ class Device(Switches):
     ] = "log2"
     depth_bits: Annotated[int, Whole("bits of a depth buffer, 32 for floats", low=16, high=32)] = 32
     fragment_color: Annotated[
-        str, Word("what gl_FragColor of WebGL 1, which is mediump, takes from a loop", ARITHMETIC)
+        str,
+        Word(
+            "what gl_FragColor of WebGL 1, which is mediump, takes from a loop",
+            {"float32": ARITHMETIC["float32"], "float16": ARITHMETIC["float16"]},
+        ),
     ] = "float32"
 
     @property

@@ -13,7 +13,7 @@ import dataclasses
 from collections.abc import Hashable, Mapping
 from dataclasses import dataclass, fields
 from functools import cache
-from typing import Annotated, Any, Self, TypeAlias, cast, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, ClassVar, Self, TypeAlias, cast, get_args, get_origin, get_type_hints
 
 from volref.arrays import number, one_of, whole_number
 from volref.errors import SceneError
@@ -91,7 +91,16 @@ class Switch:
 
 @dataclass(frozen=True)
 class Switches:
-    """A record of switches; see the head of this module."""
+    """A record of switches; see the head of this module.
+
+    group: what comes before the name of a switch in sentences, given with the class.
+    """
+
+    group: ClassVar[str]
+
+    def __init_subclass__(cls, *, group: str) -> None:
+        """Keep the name of the group."""
+        cls.group = group
 
     def __post_init__(self) -> None:
         """Refuse a switch that breaks its rule."""
@@ -99,7 +108,7 @@ class Switches:
             value = getattr(self, switch.name)
             if value is None and switch.optional:
                 continue
-            checked = switch.rule.checked(f"{group_name(type(self))}.{switch.name}", value)
+            checked = switch.rule.checked(f"{self.group}.{switch.name}", value)
             object.__setattr__(self, switch.name, checked)
 
     def as_dict(self) -> dict[str, Plain]:
@@ -149,18 +158,6 @@ def check_head(name: str, values: dict[str, Any], kind: str, version: int) -> No
         if type(got) is not type(wanted) or got != wanted:
             message = f"{name}.{key} must be {wanted!r}, got {got!r}; this is another kind of file"
             raise SceneError(message)
-
-
-def group_name(kind: type) -> str:
-    """Return the word for a kind of record in sentences: its name in lower case with underscores.
-
-    Examples
-    --------
-    >>> class RaySetup: ...
-    >>> group_name(RaySetup)
-    'ray_setup'
-    """
-    return "".join(f"_{c.lower()}" if c.isupper() else c for c in kind.__name__).lstrip("_")
 
 
 def switches_of(kind: type[Switches]) -> tuple[Switch, ...]:

@@ -8,7 +8,7 @@ from volref.emulation.switches import Flag, Real, Switches, Whole, Word
 
 
 @dataclass(frozen=True)
-class RaySetup(Switches):
+class RaySetup(Switches, group="pipeline.rays"):
     """Where rays enter and leave the box."""
 
     kind: Annotated[
@@ -53,7 +53,7 @@ class RaySetup(Switches):
 
 
 @dataclass(frozen=True)
-class Stepping(Switches):
+class Stepping(Switches, group="pipeline.stepping"):
     """Where the samples of a ray lie, and what ends it."""
 
     rule: Annotated[

@@ -7,7 +7,7 @@ from volref.emulation.switches import Flag, Real, Switches, Word
 
 
 @dataclass(frozen=True)
-class SampleOpacity(Switches):
+class SampleOpacity(Switches, group="pipeline.opacity"):
     """From the opacity of the table to that of a sample."""
 
     source: Annotated[
@@ -36,7 +36,7 @@ class SampleOpacity(Switches):
 
 
 @dataclass(frozen=True)
-class Lighting(Switches):
+class Lighting(Switches, group="pipeline.lighting"):
     """What lights do to the colour of a sample."""
 
     model: Annotated[
@@ -97,7 +97,7 @@ class Lighting(Switches):
 
 
 @dataclass(frozen=True)
-class Accumulation(Switches):
+class Accumulation(Switches, group="pipeline.accumulation"):
     """How samples are put together, front to back."""
 
     rule: Annotated[

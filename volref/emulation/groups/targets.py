@@ -9,7 +9,7 @@ from volref.errors import SceneError
 
 
 @dataclass(frozen=True)
-class MeshCut(Switches):
+class MeshCut(Switches, group="pipeline.meshes"):
     """How opaque meshes cut the volume."""
 
     kind: Annotated[
@@ -68,7 +68,7 @@ class MeshCut(Switches):
 
 
 @dataclass(frozen=True)
-class Output(Switches):
+class Output(Switches, group="pipeline.output"):
     """What happens to the colour on its way to the canvas."""
 
     tone_map: Annotated[
@@ -136,7 +136,6 @@ class Output(Switches):
         """Refuse a switch that breaks its rule, and a middle that is not between its ends."""
         super().__post_init__()
         if not self.low < self.mid < self.high:
-            message = (
-                f"output.low, mid and high must rise, got {self.low:g}, {self.mid:g} and {self.high:g}; "
-            )
-            raise SceneError(message + "sort them")
+            got = ", ".join(f"{light:g}" for light in (self.low, self.mid, self.high))
+            message = f"pipeline.output.low, mid and high must rise, got {got}; sort them"
+            raise SceneError(message)

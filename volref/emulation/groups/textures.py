@@ -8,7 +8,7 @@ from volref.emulation.switches import Flag, Real, Switches, Whole, Word
 
 
 @dataclass(frozen=True)
-class VolumeTexture(Switches):
+class VolumeTexture(Switches, group="pipeline.volume"):
     """How the volume lies in textures, and how a position becomes texture coordinates."""
 
     layout: Annotated[
@@ -133,7 +133,7 @@ class VolumeTexture(Switches):
 
 
 @dataclass(frozen=True)
-class TableTexture(Switches):
+class TableTexture(Switches, group="pipeline.table"):
     """The transfer function as a texture."""
 
     size: Annotated[int, Whole("entries along the value", low=2, high=1 << 16)] = 256
