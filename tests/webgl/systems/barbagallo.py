@@ -13,7 +13,7 @@ from tests.webgl.systems.common import (
     program,
     target_of,
 )
-from volref import Scene
+from volref import Scene, Volume
 from volref.emulation.loop.opacity import factor_of
 from volref.emulation.pipeline import Pipeline
 from volref.emulation.rays.box import box_of
@@ -50,7 +50,7 @@ def draw(
         "back_coordinates": target_of(pipeline.rays.format, filtering=pipeline.rays.filter),
         IMAGE: target_of(pipeline.output.format),
     }
-    textures = {"atlas": atlas_of(uploads, pipeline), "colors": canvas_of(uploads, pipeline)}
+    textures = {"atlas": atlas_of(scene, uploads, pipeline), "colors": canvas_of(uploads, pipeline)}
     return drawn(engine, Job(scene.width, scene.height, passes, textures, targets))
 
 
@@ -71,10 +71,20 @@ def defines_of(pipeline: Pipeline, uploads: Uploads) -> dict[str, object]:
     return {**numbers, **{name: 1 for name, on in flags.items() if on}}
 
 
-def atlas_of(uploads: Uploads, pipeline: Pipeline) -> Texture:
-    """PNG of the slices, row 0 its top, with the values in alpha; uploaded upside down, as three.js does."""
-    png = np.zeros((*uploads.volume.shape[:2], 4), np.uint8)
-    png[..., 3] = uploads.volume[::-1, :, 0]
+def atlas_of(scene: Scene, uploads: Uploads, pipeline: Pipeline) -> Texture:
+    """PNG of the slices, row 0 its top, with the values in alpha; uploaded upside down, as three.js does.
+
+    Slices are put into it here, from the first tile in the upper left corner on, y upwards.
+    """
+    assert isinstance(scene.volume, Volume)
+    low, high = uploads.domain
+    slices = np.rint(255 * np.clip((scene.volume.values.astype(float) - low) / (high - low), 0, 1))
+    count, height, width = slices.shape
+    across = int(np.ceil(np.sqrt(count)))
+    png = np.zeros((-(-count // across) * height, across * width, 4), np.uint8)
+    for number, values in enumerate(slices):
+        top, left = number // across * height, number % across * width
+        png[top : top + height, left : left + width, 3] = values[::-1]
     return Texture(png, "rgba8", pipeline.volume.filter, flip_y=True)
 
 
