@@ -75,7 +75,7 @@ def environment(scene: Scene, kind: str) -> Texture:
 
 
 def _passes(scene: Scene, pipeline: Pipeline, frames: int) -> Iterator[Pass]:
-    generate = program("cej.vertex", "cej.fragment", defines_of(scene, pipeline))
+    generate = program("unproject.vertex", "cej.fragment", defines_of(scene, pipeline))
     generated = {
         "texture_from_clip": float32(np.linalg.inv(box_of(scene).clip_from_texture)),
         "volume": "volume",

@@ -51,7 +51,7 @@ def offsets_of(jitter: np.ndarray | None, frames: int) -> list[float]:
 
 def _passes(scene: Scene, pipeline: Pipeline, offsets: list[float]) -> Iterator[Pass]:
     screen, output = "vpt_screen.vertex", pipeline.output
-    generate = program("vpt.vertex", "vpt.fragment", {"ALPHA": ALPHA[pipeline.accumulation.alpha]})
+    generate = program("unproject.vertex", "vpt.fragment", {"ALPHA": ALPHA[pipeline.accumulation.alpha]})
     generated = {
         "texture_from_clip": float32(np.linalg.inv(box_of(scene).clip_from_texture)),
         "volume": "volume",

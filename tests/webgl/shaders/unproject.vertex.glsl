@@ -1,5 +1,5 @@
 #version 300 es
-// VPT, frame: a triangle over the whole target; its corners on the near and the far plane, in texture space.
+// VPT and Cej, frame: a triangle over the whole target; its corners on the near and the far plane, in texture space.
 precision highp float;
 uniform mat4 texture_from_clip;
 in vec2 position;
