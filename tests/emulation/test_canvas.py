@@ -185,8 +185,12 @@ def test_what_the_shader_writes_as_alpha():
     for word, alphas in (("accumulated", [0.5, 1.2]), ("weighted", [0.4, 0.9]), ("one", [1.0, 1.0])):
         found = fragment_colors(loop, Accumulation(alpha=word))
         np.testing.assert_array_equal(found, [[0.1, 0.2, 0.3, alphas[0]], [0.6, 0.6, 0.6, alphas[1]]])
-    found = fragment_colors(loop, Accumulation(normalize=True))
+    found = fragment_colors(loop, Accumulation(normalize="above-one"))
     np.testing.assert_array_equal(found, [[0.1, 0.2, 0.3, 0.5], [0.6 / 1.2] * 3 + [1.2]])
+    found = fragment_colors(loop, Accumulation(normalize="always"))
+    np.testing.assert_array_equal(found, [[0.1 / 0.5, 0.2 / 0.5, 0.3 / 0.5, 0.5], [0.6 / 1.2] * 3 + [1.2]])
+    empty = fragment_colors(marched([[0.0]] * 3, [0.0], [0.0]), Accumulation(normalize="always"))
+    np.testing.assert_array_equal(empty, [[0.0] * 4])
 
 
 def test_an_environment_is_added_behind_and_nothing_of_it_behind_more_than_all():

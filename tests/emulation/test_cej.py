@@ -319,6 +319,29 @@ def test_the_noise_is_the_formula_at_pixel_centres_from_the_bottom_up():
 # Other programs with lights
 
 
+def test_forward_differences_are_one_sided():
+    """On a ramp both are its slope; over a ridge central ones are 0 and forward ones are not."""
+    lamp, matte = (vr.Light.directional((-1, 0, 0)),), vr.Material("lambert", ambient=0.0, diffuse=1.0)
+    x = np.arange(9)
+    ramp, ridge = 20.0 * x, 100.0 - 20.0 * abs(x - 4)
+    along_z = vr.Camera.orthographic((4, 4, 30), (4, 4, 4), (0, 1, 0), 9.0, 1, 60)
+    images = {}
+    for name, profile in (("ramp", ramp), ("ridge", ridge)):
+        shown = scene(lamp, matte, field=vr.Volume(np.tile(profile, (9, 9, 1))), background=(0, 0, 0, 1))
+        white = vr.TransferFunction.from_opacity([0, 255], [(1, 1, 1)] * 2, [0.5] * 2)
+        shown = dataclasses.replace(shown, camera=along_z, width=9, height=9, transfer=white)
+        for kind in ("central", "forward"):
+            program = named("texture3d").with_switches(
+                lighting={"model": "lit", "gradient": kind}, volume={"format": "exact"}
+            )
+            images[name, kind] = vr.emulate(shown, program, vr.Device.named("exact")).rgba[4, 1:8, 0]
+    # Light travels along -x, so what rises along x turns away from it, and what falls faces it.
+    assert images["ramp", "central"].tolist() == images["ramp", "forward"].tolist() == [0.0] * 7
+    lit_central, lit_forward = (images["ridge", kind] > 0.5 for kind in ("central", "forward"))
+    assert lit_central.tolist() == [False] * 4 + [True] * 3
+    assert lit_forward.tolist() == [False] * 3 + [True] * 4
+
+
 @pytest.mark.parametrize("spacing", [(1.0, 1.0, 1.0), (1.0, 1.3, 1.6)])
 def test_model_lit_with_central_differences_tends_to_volrefs_own_lit_volume(spacing):
     smooth = vr.Volume(

@@ -227,12 +227,13 @@ def by_hand(rule, alphas, colors):
             alpha = a + (1 - a) * alpha
             continue
         color += (1 - alpha) * a * c
-        alpha += a if rule == "add-alpha" else (1 - alpha) * a
+        alpha += (1 - alpha) * a if rule == "over" else a
+        alpha = min(alpha, 1.0) if rule == "add-clamped" else alpha
     return color, alpha
 
 
 @pytest.mark.parametrize("light", [1.0, 0.75])
-@pytest.mark.parametrize("rule", ["over", "add-alpha", "reversed-over"])
+@pytest.mark.parametrize("rule", ["over", "add-alpha", "add-clamped", "reversed-over"])
 def test_samples_are_put_together_as_the_rule_says(rule, light):
     # Four slices along z, looked at from z: four samples in their middles.
     values = np.repeat([51, 204, 102, 255], 16).astype(np.uint8).reshape(4, 4, 4)

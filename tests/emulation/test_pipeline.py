@@ -62,7 +62,7 @@ BROKEN = {
     ),
     "table": ({"size": 1}, r"pipeline.table.size must be a whole number from 2 to 65536, got 1"),
     "opacity": ({"factor": -1}, r"pipeline.opacity.factor must be at least 0, got -1"),
-    "accumulation": ({"normalize": 1}, r"pipeline.accumulation.normalize must be true or false, got 1"),
+    "accumulation": ({"normalize": True}, r"pipeline.accumulation.normalize must be 'none'"),
     "meshes": ({"kind": "depths"}, r"pipeline.meshes.kind must be"),
     "lightning": ({}, r"pipeline must have switches it knows, got 'lightning'"),
 }

@@ -188,6 +188,20 @@ def test_entries_of_a_table_are_the_transfer_functions_own_values():
             np.testing.assert_allclose(row, expected, rtol=0, atol=1e-14, err_msg=baked)
 
 
+def test_opacities_of_a_texture_of_their_own_have_its_format():
+    program = Pipeline("p").with_switches(table={"size": 16, "format": "unorm8", "opacity_format": "exact"})
+    both = uploads_of(scene(some_values()), program).table
+    apart = {
+        kind: uploads_of(scene(some_values()), program.with_switches(table=switches)).table
+        for kind, switches in (
+            ("bytes", {"opacity_format": None}),
+            ("exact", {"format": "exact", "opacity_format": None}),
+        )
+    }
+    np.testing.assert_array_equal(both[..., :3], apart["bytes"][..., :3] / 255)
+    np.testing.assert_array_equal(both[..., 3], apart["exact"][..., 3])
+
+
 def foot_on_gradient(x, y, right, bottom):
     """The share of the way from (0, 0) to (right, bottom) at which the foot of (x, y) lies."""
     length = math.hypot(right, bottom)

@@ -167,7 +167,7 @@ def test_an_alpha_above_one_divides_the_colour(opacity):
     frame = emulate(block(255, transfer), pipeline).passes["frame"][0, 0]
     # Colours are bytes of the table.
     np.testing.assert_allclose(frame, [64 / 255, 128 / 255, 191 / 255, 1.0], rtol=0, atol=1e-7)
-    without = pipeline.with_switches(accumulation={"normalize": False})
+    without = pipeline.with_switches(accumulation={"normalize": "none"})
     over = emulate(block(255, transfer), without).passes["frame"][0, 0]
     np.testing.assert_allclose(over[:3], opacity * frame[:3], rtol=1e-6)
 
@@ -221,5 +221,5 @@ def test_one_byte_of_a_dark_mean_is_twenty_on_the_canvas():
 
 
 def test_a_middle_beside_its_ends_is_refused():
-    with pytest.raises(SceneError, match="low, mid and high must rise, got 0, 1 and 1; sort them"):
+    with pytest.raises(SceneError, match="low, mid and high must rise, got 0, 1, 1; sort them"):
         VPT.with_switches(output={"mid": 1.0})

@@ -74,8 +74,8 @@ def widened(pipeline: Pipeline) -> Pipeline:
     return pipeline.with_switches(
         rays=exact,
         volume=exact,
-        table=exact,
-        accumulation={"alpha": "accumulated"},
+        table={"format": "exact", "opacity_format": None},
+        accumulation={"alpha": "accumulated", "normalize": "none"},
         meshes={"format": "exact", "packing": "exact"},
         output=output,
     )
@@ -113,7 +113,7 @@ def _refuse_printed(scene: Scene, pipeline: Pipeline) -> None:
     """Refuse programs whose image is not that of an emission-absorption integral at any step."""
     volume, table = pipeline.volume, pipeline.table
     reasons = {
-        "alpha is added without what is in front": pipeline.accumulation.rule == "add-alpha",
+        "alpha is added without what is in front": pipeline.accumulation.rule.startswith("add-"),
         "deeper samples lie in front": pipeline.accumulation.rule == "reversed-over",
         "the tiles of the atlas are mixed up": volume.tile_row != "columns"
         or volume.second_column != "fract",

@@ -34,7 +34,7 @@ WORKING = Pipeline(
     table=TableTexture(size=256, rows=256, coordinate="direct"),
     opacity=SampleOpacity(source="table", rule="per-length"),
     lighting=Lighting(model="cej", gradient="sobel-bytes", zero="exact", flat="ambient", space="world"),
-    accumulation=Accumulation(rule="over", alpha="one", normalize=True),
+    accumulation=Accumulation(rule="over", alpha="one", normalize="above-one"),
     meshes=MeshCut(kind="none"),
     output=Output(blend="environment", mean_format="unorm8"),
 )

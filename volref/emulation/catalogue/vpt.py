@@ -30,7 +30,7 @@ PIPELINES = (
         volume=VolumeTexture(layout="3d", format="unorm8"),
         table=TableTexture(size=256, coordinate="direct", srgb=True),
         opacity=SampleOpacity(source="table", rule="per-length"),
-        accumulation=Accumulation(rule="over", alpha="one", normalize=True),
+        accumulation=Accumulation(rule="over", alpha="one", normalize="above-one"),
         meshes=MeshCut(kind="none"),
         output=Output(tone_map="artistic", gamma=2.2, blend="none", missed="black", mean_format="unorm8"),
     ),

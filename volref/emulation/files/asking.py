@@ -66,7 +66,6 @@ NEEDS: dict[str, Mapping[str, Test]] = {
     "lighting.zero": {"lighting.gradient": _bakes_gradients},
     "lighting.flat": {"lighting.gradient": _bakes_gradients},
     "lighting.space": {"lighting.model": _is("cej")},
-    "accumulation.normalize": {"accumulation.rule": _is("add-alpha")},
     "meshes.depth": MESH_DEPTH,
     "meshes.packing": MESH_DEPTH,
     "meshes.comparison": MESH_DEPTH,

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Annotated
 
-from volref.emulation.switches import Flag, Real, Switches, Word
+from volref.emulation.switches import Real, Switches, Word
 
 
 @dataclass(frozen=True)
@@ -58,6 +58,7 @@ class Lighting(Switches, group="pipeline.lighting"):
             {
                 "none": "nowhere",
                 "central": "central differences of the texture, one voxel to each side",
+                "forward": "differences of the texture to the sample and one voxel behind it, vtk.js",
                 "sobel-bytes": "a texture of value and gradient: minus Sobel's operator over 27, border 0",
                 "sobel-bytes-printed": "the same with the misprint in the z kernel of seed 004's code",
             },
@@ -107,6 +108,7 @@ class Accumulation(Switches, group="pipeline.accumulation"):
             {
                 "over": "C += (1 - A) a c; A += (1 - A) a",
                 "add-alpha": "C += (1 - A) a c; A += a, seed 001's eq. 4 and seed 002's article",
+                "add-clamped": "C += (1 - A) a c; A = min(A + a, 1), VPT's DOS",
                 "reversed-over": "C = a c + (1 - a) A C; A = a + (1 - a) A: the deepest sample lies in front",
             },
         ),
@@ -122,4 +124,14 @@ class Accumulation(Switches, group="pipeline.accumulation"):
             },
         ),
     ] = "accumulated"
-    normalize: Annotated[bool, Flag("whether colour is divided by an alpha above 1")] = False
+    normalize: Annotated[
+        str,
+        Word(
+            "whether colour is divided by alpha after the loop",
+            {
+                "none": "no",
+                "above-one": "where alpha is above 1, VPT",
+                "always": "where alpha is above 0: straight colour, for a blend that multiplies, vtk.js",
+            },
+        ),
+    ] = "none"

@@ -147,6 +147,10 @@ class TableTexture(Switches, group="pipeline.table"):
         ),
     ] = None
     format: Annotated[str, Word("what an entry holds", STORED)] = "unorm8"
+    opacity_format: Annotated[
+        str | None,
+        Word("what holds its opacity, if that is a texture of its own, vtk.js (None: none)", STORED),
+    ] = None
     filter: Annotated[
         str,
         Word(

@@ -283,4 +283,6 @@ def _accumulate(program: Program, walk: _Walk, found: Found, opacity: Floats) ->
     if pipeline.accumulation.alpha == "weighted":
         own = found.value if pipeline.opacity.source == "value" else color[3]
         walk.weighted += own * weight
-    walk.alpha = walk.alpha + (opacity if rule == "add-alpha" else weight)
+    walk.alpha = walk.alpha + (weight if rule == "over" else opacity)
+    if rule == "add-clamped":
+        np.minimum(walk.alpha, kind(1), out=walk.alpha)

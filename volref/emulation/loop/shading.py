@@ -101,7 +101,7 @@ def check_gradients(scene: Scene, pipeline: Pipeline) -> None:
     if lighting.model != "none" and (lighting.gradient == "none" or table.order == "pre"):
         message = f"pipeline.lighting.gradient must be had for model {lighting.model!r}, got "
         message += f"{lighting.gradient!r} of values classified {table.order!r}; "
-        raise SceneError(message + "use 'central' or 'sobel-bytes', and 'post'")
+        raise SceneError(message + "use 'central', 'forward' or 'sobel-bytes', and 'post'")
     if pipeline.opacity.by_gradient or table.rows > 1:
         message = "pipeline.opacity.by_gradient and pipeline.table.rows must be 0 and 1 without a texture of "
         message += f"gradients, got {pipeline.opacity.by_gradient:g} and {table.rows}; "
@@ -246,22 +246,26 @@ def _cosine(cosine: Floats, material: Material) -> Floats:
 def _surface(textures: Textures, place: Place, position: Floats, found: Found) -> tuple[Floats, Floats]:
     """Return points and unit normals (3, n), towards lesser values; 0 where there is no gradient."""
     points = transform_points(place.points, position.T.astype(textures.device.values_type)).T
-    gradient = found.gradient if found.gradient is not None else _central(textures, position)
+    gradient = found.gradient if found.gradient is not None else _differences(textures, position, found)
     _, normals = length_and_direction(in_world(gradient, place.normals))
     if found.magnitude is not None and textures.pipeline.lighting.flat == "ambient":
         normals = np.where(found.magnitude < FLAT, 0, normals)
     return points, normals
 
 
-def _central(textures: Textures, position: Floats) -> Floats:
-    """Return minus the gradient per voxel (3, n): half the difference one voxel before and behind."""
+def _differences(textures: Textures, position: Floats, found: Found) -> Floats:
+    """Return minus the gradient per voxel (3, n), by differences of what the program finds.
+
+    "central": half the difference one voxel before and behind.  "forward": the one to the voxel behind.
+    """
     work, kind = Workspace(), position.dtype.type
+    central = textures.pipeline.lighting.gradient == "central"
     gradient = np.empty(position.shape, textures.device.values_type)
     for axis, size in enumerate(textures.size):
         sides = []
-        for way in (-1, 1):
+        for way in (-1, 1) if central else (1,):
             place = position.copy()
             place[axis] += kind(way / size)
             sides.append(look_up(textures, place, work).value)
-        gradient[axis] = (sides[0] - sides[1]) / 2
+        gradient[axis] = (sides[0] - sides[1]) / 2 if central else found.value - sides[0]
     return gradient

@@ -23,8 +23,10 @@ def fragment_colors(marched: Marched, accumulation: Accumulation) -> Floats:
     """Return what the shader has after its loop (F, 4)."""
     alpha = {"accumulated": marched.alpha, "weighted": marched.weighted}.get(accumulation.alpha)
     color = marched.color
-    if accumulation.normalize:
-        color = np.where(marched.alpha > 1, color / np.maximum(marched.alpha, 1), color)
+    if accumulation.normalize != "none":
+        least = 1 if accumulation.normalize == "above-one" else 0
+        divided = marched.alpha > least
+        color = np.where(divided, color / np.where(divided, marched.alpha, 1), color)
     if alpha is None:
         alpha = np.ones_like(marched.alpha)
     return np.concatenate([color, alpha[None]]).T

@@ -63,7 +63,7 @@ def uploads_of(scene: Scene, pipeline: Pipeline) -> Uploads:
     entries = baked_table(scene, pipeline, domain)
     if pipeline.table.srgb:
         entries[..., :3] = encode_srgb(entries[..., :3])
-    table = _as_uploaded(entries, pipeline.table.format)
+    table = _table(entries, pipeline.table)
     values, size, grid = _values_of(scene.volume, pipeline)
     unit = (values - domain[0]) / (domain[1] - domain[0])
     channels = unit[..., None]
@@ -280,6 +280,14 @@ def mesa_srgb(codes: Floats) -> Floats:
     """
     cubic = 0.0023 + codes * (0.0030 + codes * (0.6935 + codes * 0.3012))
     return np.where(codes <= 15 / 255, codes / 12.6, cubic)
+
+
+def _table(entries: Floats, table: TableTexture) -> Numbers:
+    """Return a table's entries as they are uploaded: numbers where colours and opacities are two textures."""
+    if table.opacity_format is None:
+        return _as_uploaded(entries, table.format)
+    colors, opacities = stored(entries[..., :3], table.format), stored(entries[..., 3:], table.opacity_format)
+    return np.concatenate([colors, opacities], axis=-1)
 
 
 def _as_uploaded(entries: Floats, kind: str) -> Numbers:
