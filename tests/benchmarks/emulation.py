@@ -15,7 +15,7 @@ from volref.emulation.loop.marching import march
 REPEATS = 5
 
 
-def noise(side=64, pixels=160):
+def noise(side=64, pixels=320):
     """A cube of noise seen obliquely, so faint that no ray ends early."""
     random = np.random.default_rng(0)
     volume = vr.Volume((random.random((side, side, side)) * 255).astype(np.uint8))
