@@ -5,15 +5,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from volref.cli.options import add_force, add_json, add_scene, read_scene
-from volref.cli.output import note, print_json
+from volref.cli.output import check_targets, note, print_json
 from volref.cli.programs import add_program, read_jitter, read_program
 from volref.cli.verb import GOOD, Verb
 from volref.errors import FormatError
 
 if TYPE_CHECKING:
     from volref.emulation.result import Emulation
-
-SUFFIXES = (".png", ".exr", ".npy", ".npz")
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
@@ -61,33 +59,19 @@ def _run(options: argparse.Namespace) -> int:
 
 def _check_targets(targets: list[Path], passes: str | None, *, force: bool, json: bool) -> None:
     """Refuse what could not be written, before the work rather than after it."""
+    from volref.io.atomic import check_free
+
     if not (targets or passes or json):
         message = "-o must be given, or --passes or --json, got none; name a file such as -o canvas.png"
         raise FormatError(message)
-    for i, target in enumerate(targets):
-        if target.suffix.lower() not in SUFFIXES:
-            message = f"{target} must end in {', '.join(SUFFIXES)}, got {target.suffix!r}; rename it"
-            raise FormatError(message)
-        if target in targets[:i]:
-            message = f"{target} must be named once, got it twice; give each -o its own name"
-            raise FormatError(message)
-        if not target.parent.is_dir():
-            message = f"{target} must lie in a folder that exists, got {target.parent}; create it first"
-            raise FormatError(message)
-    _check_free(targets, force=force)
+    check_targets(targets, force=force)
     if passes is None:
         return
     if Path(passes).exists() and not Path(passes).is_dir():
         message = f"{passes} must be a folder, got a file; choose another name"
         raise FormatError(message)
     # Targets of another run beside these would be taken for these.
-    _check_free(sorted(Path(passes).glob("[0-9][0-9]_*.*")), force=force)
-
-
-def _check_free(paths: list[Path], *, force: bool) -> None:
-    from volref.io.atomic import check_free
-
-    for path in paths:
+    for path in sorted(Path(passes).glob("[0-9][0-9]_*.*")):
         check_free(path, overwrite=force)
 
 

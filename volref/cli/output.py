@@ -4,7 +4,13 @@ import json
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
+
+from volref.errors import FormatError
+
+# Endings of the images that commands write.
+SUFFIXES = (".png", ".exr", ".npy", ".npz")
 
 # How the command line says what the library's errors say in Python.
 CURES = (
@@ -15,6 +21,29 @@ CURES = (
     ("pass method='march'", "pass --method march"),
     ("pass them or", "pass them with -D or"),
 )
+
+
+def check_targets(targets: list[Path], *, force: bool) -> None:
+    """Refuse names of images that could not be written, before the work rather than after it.
+
+    Raises
+    ------
+    FormatError
+        If the ending is no image's, a name comes twice, its folder is not there, or it is taken (not `force`).
+    """
+    from volref.io.atomic import check_free
+
+    for i, target in enumerate(targets):
+        if target.suffix.lower() not in SUFFIXES:
+            message = f"{target} must end in {', '.join(SUFFIXES)}, got {target.suffix!r}; rename it"
+            raise FormatError(message)
+        if target in targets[:i]:
+            message = f"{target} must be named once, got it twice; give each -o its own name"
+            raise FormatError(message)
+        if not target.parent.is_dir():
+            message = f"{target} must lie in a folder that exists, got {target.parent}; create it first"
+            raise FormatError(message)
+        check_free(target, overwrite=force)
 
 
 def print_json(document: object) -> None:

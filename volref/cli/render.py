@@ -16,18 +16,15 @@ from volref.cli.options import (
     fraction,
     read_scene,
 )
-from volref.cli.output import note, print_json, progress
+from volref.cli.output import check_targets, note, print_json, progress
 from volref.cli.rays import add_rays, draw_with
 from volref.cli.series import add_series, check_no_series, run_series
 from volref.cli.verb import DIFFERS, GOOD, Verb
-from volref.errors import FormatError
 
 if TYPE_CHECKING:
     from volref.scene.scene import Scene
     from volref.truth.result import Render
     from volref.truth.verification import Verification
-
-SUFFIXES = (".png", ".exr", ".npy", ".npz")
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
@@ -69,7 +66,7 @@ def _run(options: argparse.Namespace) -> int:
         return run_series(options)
     check_no_series(options)
     targets = [Path(name) for name in options.output]
-    _check_targets(targets, force=options.force)
+    check_targets(targets, force=options.force)
     check_display(options)
     scene = read_scene(options)
     if options.verify is not None:
@@ -103,23 +100,6 @@ def _verified(scene: "Scene", out: "Render", options: argparse.Namespace) -> "Ve
 
     with progress("verify", quiet=options.quiet) as show:
         return verify(scene, out, options.verify, progress=show)
-
-
-def _check_targets(targets: list[Path], *, force: bool) -> None:
-    """Refuse what could not be written, before the work rather than after it."""
-    from volref.io.atomic import check_free
-
-    for i, target in enumerate(targets):
-        if target.suffix.lower() not in SUFFIXES:
-            message = f"{target} must end in {', '.join(SUFFIXES)}, got {target.suffix!r}; rename it"
-            raise FormatError(message)
-        if target in targets[:i]:
-            message = f"{target} must be named once, got it twice; give each -o its own name"
-            raise FormatError(message)
-        if not target.parent.is_dir():
-            message = f"{target} must lie in a folder that exists, got {target.parent}; create it first"
-            raise FormatError(message)
-        check_free(target, overwrite=force)
 
 
 def _figures(out: "Render", outputs: list[str]) -> dict[str, Any]:
