@@ -29,7 +29,7 @@ def check_targets(targets: list[Path], *, force: bool) -> None:
     Raises
     ------
     FormatError
-        If the ending is no image's, a name comes twice, its folder is not there, or it is taken (not `force`).
+        If the ending is no image's, a name comes twice, its folder is not there, or a file has it already.
     """
     from volref.io.atomic import check_free
 
