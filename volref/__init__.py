@@ -50,6 +50,8 @@ if TYPE_CHECKING:
         write_animation,
         write_image,
     )
+    from volref.oracle.acceptance import Acceptance
+    from volref.oracle.accepting import accept
     from volref.oracle.metrics import Comparison, compare
     from volref.oracle.tracing import trace
     from volref.phantoms.transfer import dbz_transfer
@@ -86,6 +88,7 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 __all__ = [
+    "Acceptance",
     "AtlasLayout",
     "Camera",
     "Candidates",
@@ -111,6 +114,7 @@ __all__ = [
     "TransferFunction2D",
     "Verification",
     "Volume",
+    "accept",
     "arcball_rotation",
     "axis_slice",
     "cappi",
@@ -171,6 +175,8 @@ _HOMES = {
     "volref.emulation.pipeline": ("Pipeline",),
     "volref.emulation.result": ("Emulation",),
     "volref.errors": ("FormatError", "SceneError"),
+    "volref.oracle.acceptance": ("Acceptance",),
+    "volref.oracle.accepting": ("accept",),
     "volref.oracle.metrics": ("Comparison", "compare"),
     "volref.oracle.tracing": ("trace",),
     "volref.phantoms.transfer": ("dbz_transfer",),

@@ -1,0 +1,1 @@
+"""Faults of real renderers, as named changes of a program, a scene or an image."""
