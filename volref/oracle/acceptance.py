@@ -1,12 +1,15 @@
 """What `accept` returns: for every pixel and channel, what a correct machine may draw."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from volref.arrays import Booleans, Floats
+from volref.arrays import Booleans, Floats, float_array, number, plain_array
 from volref.emulation.device import Device
+from volref.emulation.groups import Output
 from volref.emulation.pipeline import Pipeline
 
 
@@ -35,6 +38,11 @@ class Acceptance:
         What was accepted, on what.
     seconds
         Wall time.
+    low_quality
+        Makes the intervals of the same on a machine with linear filters of 4 bits, which some have and no
+        specification forbids; None where the program or the device leaves no room for one.
+    justified
+        Whether the intervals are derived from the scene; False where somebody chose them.
     """
 
     lo: Floats
@@ -50,6 +58,59 @@ class Acceptance:
     device: Device
     frames: int
     seconds: float
+    low_quality: "Callable[[], Acceptance] | None" = None
+    justified: bool = True
+
+    @classmethod
+    def unjustified(cls, image: ArrayLike, tolerance: float) -> Self:
+        """Return the intervals image +- tolerance: a number that somebody chose, nothing derives it.
+
+        Every verdict by it says so.
+
+        Parameters
+        ----------
+        image
+            RGBA (H, W, 4), bytes or numbers of a canvas, premultiplied.
+        tolerance
+            The largest difference to let pass, in parts of 1.
+
+        Raises
+        ------
+        SceneError
+            If the image is none, or the tolerance is negative.
+
+        Examples
+        --------
+        >>> grey = np.full((1, 1, 4), 51, np.uint8)
+        >>> chosen = Acceptance.unjustified(grey, 1 / 255)
+        >>> (255 * chosen.lo[0, 0]).round().tolist(), chosen.justified
+        ([50.0, 50.0, 50.0, 50.0], False)
+        """
+        codes = plain_array("image", image)
+        unit = codes / np.iinfo(codes.dtype).max if codes.dtype.kind == "u" else codes
+        nominal = float_array("image", unit, ("height", "width", 4))
+        slack = number("tolerance", tolerance, low=0)
+        lo, hi = nominal - slack, nominal + slack
+        marked = np.zeros(nominal.shape[:2], np.bool_)
+        # Numbers as they are: no canvas is known that would round them.
+        program = Pipeline("none", output=Output(format="exact"))
+        return cls(
+            lo,
+            hi,
+            nominal,
+            lo,
+            hi,
+            marked,
+            nominal.any(axis=-1),
+            {},
+            "",
+            program,
+            Device(),
+            1,
+            0.0,
+            None,
+            justified=False,
+        )
 
     @property
     def width(self) -> Floats:
