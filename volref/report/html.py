@@ -3,19 +3,28 @@
 Whatever comes from a scene or a caller is text and is escaped here; nobody passes markup in.
 """
 
-import base64
 import platform
 from collections.abc import Sequence
 from html import escape
-from importlib import resources
 
 import numpy as np
 
-from volref.arrays import Bytes, Numbers
+from volref.arrays import Numbers
 from volref.image import encode_rgba8
 from volref.planning import SHORTCUTS, Plan
 from volref.report.figures import KINDS, Figures, figures_of, levels
-from volref.report.pictures import VIRIDIS, ColoredMap, distance_map, error_map, png_bytes
+from volref.report.markup import (
+    Row,
+    code_block,
+    document,
+    facts,
+    inline_image,
+    legend,
+    paragraph,
+    scrolling,
+    section,
+)
+from volref.report.pictures import ColoredMap, distance_map, error_map
 from volref.scene.camera import Camera
 from volref.scene.mesh import Mesh
 from volref.scene.radar import RadarVolume
@@ -23,8 +32,6 @@ from volref.scene.scene import Scene
 from volref.scene.transfer2d import TransferFunction2D
 from volref.scene.volume import Volume
 from volref.truth.result import Render
-
-Row = tuple[str, str]
 
 
 def render_page(
@@ -60,17 +67,17 @@ def render_page(
     """
     numbers = figures_of(out)
     parts = [
-        f"<header><h1>{escape(title)}</h1>{_paragraph(lead)}</header>",
+        f"<header><h1>{escape(title)}</h1>{paragraph(lead)}</header>",
         _picture(scene, out, alt or lead or title),
-        _section("Error and time", _figures(numbers, figures)),
-        _section("Depth and error", _maps(out, unit)),
-        _section("What was done, and what was left out", _plan(out.plan, unit)),
-        _section("The scene", _rows(scene_rows(scene, unit))),
-        _section("Make it again", "".join(_code(name, code) for name, code in repeat)) if repeat else "",
-        _section("Versions", _rows(version_rows())),
-        _section("Data", f'<pre class="text">{escape(notice)}</pre>') if notice else "",
+        section("Error and time", _figures(numbers, figures)),
+        section("Depth and error", _maps(out, unit)),
+        section("What was done, and what was left out", _plan(out.plan, unit)),
+        section("The scene", facts(scene_rows(scene, unit))),
+        section("Make it again", "".join(code_block(name, code) for name, code in repeat)) if repeat else "",
+        section("Versions", facts(version_rows())),
+        section("Data", f'<pre class="text">{escape(notice)}</pre>') if notice else "",
     ]
-    return _document(title, "\n".join(part for part in parts if part))
+    return document(title, "\n".join(part for part in parts if part))
 
 
 def scene_rows(scene: Scene, unit: str = "world units") -> list[Row]:
@@ -159,7 +166,7 @@ def _camera_rows(camera: Camera, unit: str) -> list[Row]:
 
 
 def _picture(scene: Scene, out: Render, alt: str) -> str:
-    image = _image(encode_rgba8(out.rgba), alt, scene.width, scene.height)
+    image = inline_image(encode_rgba8(out.rgba), alt, scene.width, scene.height)
     caption = f"<strong>{escape(figures_of(out).sentence)}</strong>"
     return f'<figure class="picture">{image}<figcaption>{caption}</figcaption></figure>'
 
@@ -189,7 +196,7 @@ def _figures(numbers: Figures, more: Sequence[Row]) -> str:
         "Errors are in the working space, the largest over red, green, blue and alpha; 1/255 is one level "
     )
     scale += "of an 8-bit image."
-    return f'<dl class="figures">{tiles}</dl>{_paragraph(f"{meaning} {scale}")}'
+    return f'<dl class="figures">{tiles}</dl>{paragraph(f"{meaning} {scale}")}'
 
 
 def _maps(out: Render, unit: str) -> str:
@@ -211,27 +218,9 @@ def _maps(out: Render, unit: str) -> str:
 def _map(name: str, picture: ColoredMap, about: str) -> str:
     height, width = picture.colors.shape[:2]
     ends = f" Scale: {picture.ticks[0][1]} to {picture.ticks[-1][1]} {picture.unit}." if picture.ticks else ""
-    image = _image(picture.colors, f"{name} map. {about}{ends}", width, height)
-    caption = f"<h3>{name}</h3>{_legend(picture)}{_paragraph(about)}"
+    image = inline_image(picture.colors, f"{name} map. {about}{ends}", width, height)
+    caption = f"<h3>{name}</h3>{legend(picture)}{paragraph(about)}"
     return f"<figure>{image}<figcaption>{caption}</figcaption></figure>"
-
-
-def _legend(picture: ColoredMap) -> str:
-    parts = []
-    if picture.ticks:
-        words = "".join(
-            f'<span style="left:{100 * place:g}%" class="{_side(place)}">{escape(word)}</span>'
-            for place, word in picture.ticks
-        )
-        parts.append(f'<div class="scale"></div><div class="ticks">{words}</div>')
-        parts.append(f'<p class="key">{escape(picture.unit)}</p>')
-    if picture.neutral:
-        parts.append(f'<p class="key"><span class="neutral"></span> {escape(picture.neutral)}</p>')
-    return "".join(parts)
-
-
-def _side(place: float) -> str:
-    return {0.0: "first", 1.0: "last"}.get(place, "middle")
 
 
 def _plan(plan: Plan, unit: str) -> str:
@@ -253,38 +242,7 @@ def _plan(plan: Plan, unit: str) -> str:
     )
     head = '<tr><th scope="col">stage</th><th scope="col">in or out</th><th scope="col">why</th></tr>'
     table = f"<table><thead>{head}</thead><tbody>{rows}</tbody></table>"
-    return _paragraph(f"{how}. {told}") + _scrolling("Stages", table)
-
-
-def _rows(rows: Sequence[Row]) -> str:
-    body = "".join(
-        f'<tr><th scope="row">{escape(name)}</th><td>{escape(value)}</td></tr>' for name, value in rows
-    )
-    return _scrolling("Facts", f"<table><tbody>{body}</tbody></table>")
-
-
-def _scrolling(name: str, table: str) -> str:
-    """Wrap what may be wider than a phone so that it scrolls by itself, by keyboard too."""
-    return f'<div class="scroll" role="region" aria-label="{escape(name)}" tabindex="0">{table}</div>'
-
-
-def _code(name: str, code: str) -> str:
-    label = escape(name)
-    return f'<h3>{label}</h3><pre tabindex="0" aria-label="{label}"><code>{escape(code)}</code></pre>'
-
-
-def _section(name: str, content: str) -> str:
-    label = "-".join(word for word in name.lower().replace(",", "").split())
-    return f'<section aria-labelledby="{label}"><h2 id="{label}">{escape(name)}</h2>{content}</section>'
-
-
-def _paragraph(text: str) -> str:
-    return f"<p>{escape(text)}</p>" if text else ""
-
-
-def _image(codes: Bytes, alt: str, width: int, height: int) -> str:
-    data = base64.b64encode(png_bytes(codes)).decode("ascii")
-    return f'<img alt="{escape(alt)}" width="{width}" height="{height}" src="data:image/png;base64,{data}">'
+    return paragraph(f"{how}. {told}") + scrolling("Stages", table)
 
 
 def _numbers(values: Sequence[float] | Numbers) -> str:
@@ -294,27 +252,3 @@ def _numbers(values: Sequence[float] | Numbers) -> str:
 def _floor_percent(part: float) -> str:
     """Return a percentage that says 100 only for all."""
     return f"{np.floor(part * 1000) / 10:g}"
-
-
-def _document(title: str, body: str) -> str:
-    style = resources.files("volref.report").joinpath("page.css").read_text(encoding="utf-8")
-    colors = ", ".join(f"rgb({r} {g} {b})" for r, g, b in VIRIDIS.tolist())
-    policy = "default-src 'none'; img-src data:; style-src 'unsafe-inline'"
-    return f"""<!doctype html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<meta http-equiv="Content-Security-Policy" content="{policy}">
-<title>{escape(title)}</title>
-<style>
-{style}.scale {{ background: linear-gradient(to right, {colors}); }}
-</style>
-</head>
-<body>
-<main>
-{body}
-</main>
-</body>
-</html>
-"""
