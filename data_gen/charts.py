@@ -26,9 +26,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = _parser().parse_args(arguments)
     try:
         (options.docs / "images").mkdir(parents=True, exist_ok=True)
-        write_sheet(
-            options.docs / "images" / "charts.png", contact_sheet(list(tiles()), COLUMNS), palette=True
-        )
+        write_sheet(options.docs / "images" / "charts.png", contact_sheet(list(tiles()), COLUMNS))
     except (FormatError, OSError) as error:
         print(f"charts: {error}", file=sys.stderr)
         return 2
