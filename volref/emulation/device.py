@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from volref.emulation.switches import Switches, Whole, Word
+from volref.emulation.switches import Real, Switches, Whole, Word
 from volref.errors import SceneError
 
 FORMAT = "volref-device"
@@ -110,6 +110,28 @@ class Device(Switches, group="device"):
             {"float32": ARITHMETIC["float32"], "float16": ARITHMETIC["float16"]},
         ),
     ] = "float32"
+    freedom: Annotated[
+        str,
+        Word(
+            "how far arithmetic may be from what is emulated; see `accept`",
+            {
+                "none": "not at all",
+                "rounded": "+ - * / and sqrt are rounded correctly, functions are as good as WebGPU demands",
+                "khronos": "every operation is as bad as a division of WebGPU may be, 2.5 units in the last "
+                "place",
+            },
+        ),
+    ] = "rounded"
+    weight_slack: Annotated[
+        float, Real("by how much of a texel a linear filter's weight may be off, 8-bit textures", high=0.5)
+    ] = 0.0
+    snap_slack: Annotated[
+        float, Real("by how many pixels a vertex's window position may be off", high=0.5)
+    ] = 0.0
+    store_slack: Annotated[
+        float, Real("by how much of a step more than a half an 8-bit target may round", high=0.5)
+    ] = 0.0
+    blend_slack: Annotated[float, Real("by how many steps 8-bit targets may blend amiss", high=4.0)] = 0.0
 
     @property
     def values_type(self) -> type[np.floating[Any]]:
@@ -123,7 +145,7 @@ class Device(Switches, group="device"):
 
     @classmethod
     def named(cls, name: str) -> "Device":
-        """Return a preset: "ideal", "exact", "swiftshader", "llvmpipe", "lavapipe" or "mediump".
+        """Return a preset: a machine, or a set of machines ("webgl-highp", "webgpu") around one.
 
         Raises
         ------
@@ -150,7 +172,7 @@ PRESETS: dict[str, Device] = {
     device.name: device
     for device in (
         Device(),
-        Device("exact", control="float64"),
+        Device("exact", control="float64", freedom="none"),
         Device(
             "swiftshader",
             nearest_bits=16,
@@ -183,5 +205,24 @@ PRESETS: dict[str, Device] = {
             blend="integer",
         ),
         Device("mediump", values="float16", control="float16"),
+        # Sets of machines.  Filters: 8 fraction bits, rounded (OpenGL ES leaves them open; Direct3D 11.3,
+        # section 7.18.16.1, demands 8).  Window positions: 8 bits (the same, section 3.2.4.1).  Bytes: 0.6 of
+        # a step (section 3.2.3.6).  Whole numbers blend up to 1.33 steps amiss, as Mesa's do.
+        Device(
+            "webgl-highp",
+            freedom="khronos",
+            weight_slack=2.0**-9,
+            snap_slack=2.0**-9,
+            store_slack=0.1,
+            blend_slack=1.33,
+        ),
+        Device(
+            "webgpu",
+            freedom="khronos",
+            weight_slack=2.0**-9,
+            snap_slack=2.0**-9,
+            store_slack=0.1,
+            depth_bits=32,
+        ),
     )
 }

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -52,6 +53,25 @@ class Drawing:
         return Program(self.textures, self.rule, self.paths, start, self.cut, self.shade)
 
 
+class Approach(NamedTuple):
+    """The way to the loop: meshes as they are seen, the ends of rays, how meshes cut them, the targets."""
+
+    surfaces: Surfaces
+    ends: Ends
+    cut: Cut | None
+    targets: dict[str, Floats]
+
+
+def approach(scene: Scene, pipeline: Pipeline, box: Box, device: Device) -> Approach:
+    """Return what the passes before the last one make of a scene that the program can draw."""
+    surfaces, cut = surfaces_of(scene, device), None
+    targets = mesh_targets(scene, pipeline, box, device, surfaces)
+    ends, coordinates = ends_of_rays(scene, pipeline, box, device, targets.get("mesh_distance"))
+    if pipeline.meshes.kind == "depth":
+        ends, cut = cut_rays(scene, pipeline, box, device, surfaces, targets, ends)
+    return Approach(surfaces, ends, cut, targets | coordinates)
+
+
 def prepare(scene: Scene, pipeline: Pipeline, device: Device) -> Drawing:
     """Return what the program has before its last pass.
 
@@ -66,12 +86,7 @@ def prepare(scene: Scene, pipeline: Pipeline, device: Device) -> Drawing:
     check_gradients(scene, pipeline)
     check_agreement(scene, pipeline)
     box, uploads = box_of(scene), uploads_of(scene, pipeline)
-    surfaces, cut = surfaces_of(scene, device), None
-    targets = mesh_targets(scene, pipeline, box, device, surfaces)
-    ends, coordinates = ends_of_rays(scene, pipeline, box, device, targets.get("mesh_distance"))
-    if pipeline.meshes.kind == "depth":
-        ends, cut = cut_rays(scene, pipeline, box, device, surfaces, targets, ends)
-    targets |= coordinates
+    surfaces, ends, cut, targets = approach(scene, pipeline, box, device)
     if has_gradient_volume(pipeline.lighting):
         targets = {"gradient_volume": decoded_or(uploads.volume, device.values_type)} | targets
     paths = paths_of(ends, scene, pipeline, box, device)

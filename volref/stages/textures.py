@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from volref.arrays import Floats, Numbers
+from volref.arrays import Floats, Indices, Numbers
 from volref.workspace import Workspace
 
 FILTERS = ("nearest", "linear")
@@ -98,6 +98,16 @@ def fetch(texture: Texture, coordinates: Sequence[Floats] | Floats, work: Worksp
     >>> fetch(ramp, np.array([[0.0, 0.25, 0.5, 2.0], [0.5] * 4]), Workspace()).tolist()
     [[0.0, 0.0, 0.5, 1.0]]
     """
+    return fetch_with_cell(texture, coordinates, work)[0]
+
+
+def fetch_with_cell(
+    texture: Texture, coordinates: Sequence[Floats] | Floats, work: Workspace
+) -> tuple[Floats, Indices]:
+    """Return the same, and the flat index (n,) of the cell of each point among texels padded by `PAD`.
+
+    The index is a buffer of `work`: the next fetch overwrites it.
+    """
     n = len(coordinates[0])
     result = np.empty((len(texture.corners), n), texture.texels.dtype)
     index, weights = _cells(texture, coordinates, work)
@@ -108,7 +118,7 @@ def fetch(texture: Texture, coordinates: Sequence[Floats] | Floats, work: Worksp
             codes = work.get("codes", n, np.int32)
             _interpolate_codes(corners, index, weights, codes, texture.weight_bits or 0, work)
             _decode(codes, texture.result_bits, out)
-    return result
+    return result, index
 
 
 def fetch_slices(
