@@ -67,8 +67,11 @@ class NotRunError(Exception):
 
 
 @contextmanager
-def opened(name: str) -> Iterator[Call]:
+def opened(name: str, address: str | None = None, flags: tuple[str, ...] = (), **page: Any) -> Iterator[Call]:
     """Keep a browser open, and give what calls a JavaScript function of its one page with a text.
+
+    The page is the one at `address`, which must have an <input type=file>, else an empty one; `flags` are
+    more of Chromium's, `page` settings of Playwright's `new_page` such as device_scale_factor.
 
     Playwright's event loop counts as running in the thread that started it for as long as the browser is
     open, and `asyncio.run` would refuse to start there.  So the browser has a thread of its own.
@@ -82,7 +85,7 @@ def opened(name: str) -> Iterator[Call]:
     with ThreadPoolExecutor(1, thread_name_prefix=name) as thread:
         closing = ExitStack()
         try:
-            call = thread.submit(_started, closing, executable, name).result()
+            call = thread.submit(_started, closing, executable, name, address, flags, page).result()
             yield lambda function, text: thread.submit(call, function, text).result(JOB_SECONDS)
         finally:
             thread.submit(closing.close).result(JOB_SECONDS)
@@ -100,24 +103,34 @@ def _chromium() -> str:
     return found
 
 
-def _started(closing: ExitStack, executable: str, name: str) -> Call:
+def _started(
+    closing: ExitStack,
+    executable: str,
+    name: str,
+    address: str | None,
+    flags: tuple[str, ...],
+    settings: dict[str, Any],
+) -> Call:
     from playwright.sync_api import sync_playwright
 
     implementation = IMPLEMENTATIONS[name]
     folder = Path(closing.enter_context(TemporaryDirectory(prefix="volref-webgl-")))
     browser = closing.enter_context(sync_playwright()).chromium.launch(
         executable_path=executable,
-        args=[*FLAGS, implementation.flag],
+        args=[*FLAGS, *flags, implementation.flag],
         env={**os.environ, **ENVIRONMENT},
         timeout=LAUNCH_MILLISECONDS,
     )
     closing.callback(browser.close)
-    page = browser.new_page()
+    page = browser.new_page(**settings)
     renderer = page.evaluate(RENDERER)
     if not re.search(implementation.renderer, renderer):
         message = f"{name} was asked for, drawn by {renderer}; apt-get install {implementation.packages}"
         raise NotRunError(message)
-    page.set_content("<input type=file>")
+    if address is None:
+        page.set_content("<input type=file>")
+    else:
+        page.goto(address)
 
     # Chromium reads a file ten times as fast as Playwright carries a message of some megabytes.
     def call(function: str, text: str) -> Any:

@@ -8,6 +8,7 @@ import pytest
 
 from tests.webgl.browser import IMPLEMENTATIONS, NotRunError
 from tests.webgl.engine import engine
+from tests.webgl.modules import WEBGPU, modules
 
 
 def pytest_collection_modifyitems(items):
@@ -29,10 +30,7 @@ def engine_of():
                     kept[name] = closing.enter_context(engine(name))
                 except NotRunError as why:
                     kept[name] = why
-            if isinstance(kept[name], NotRunError):
-                refuse = pytest.fail if os.environ.get("VOLREF_REQUIRE_WEBGL") == "1" else pytest.skip
-                refuse(f"not run: {kept[name]}")
-            return kept[name]
+            return _had(kept[name])
 
         yield get
 
@@ -53,3 +51,32 @@ def every_webgl(request, engine_of):
 def swiftshader(engine_of):
     """The implementation that is part of Chromium."""
     return engine_of("swiftshader")
+
+
+@pytest.fixture(scope="session")
+def page(tmp_path_factory):
+    """A page with volref's ES modules, on SwiftShader, with WebGPU; a device pixel for a CSS pixel."""
+    yield from _page("swiftshader", tmp_path_factory, WEBGPU)
+
+
+@pytest.fixture(scope="session")
+def fine_page(tmp_path_factory):
+    """A page with volref's ES modules, on Mesa's llvmpipe; 2 x 2 device pixels for a CSS pixel."""
+    yield from _page("llvmpipe", tmp_path_factory, device_scale_factor=2)
+
+
+def _page(name, tmp_path_factory, flags=(), **settings):
+    with ExitStack() as closing:
+        try:
+            opened = closing.enter_context(modules(name, tmp_path_factory.mktemp("files"), flags, **settings))
+        except NotRunError as why:
+            opened = why
+        yield _had(opened)
+
+
+def _had(opened):
+    """Return what was opened; where it cannot be had the test is not run, or fails in CI."""
+    if isinstance(opened, NotRunError):
+        refuse = pytest.fail if os.environ.get("VOLREF_REQUIRE_WEBGL") == "1" else pytest.skip
+        refuse(f"not run: {opened}")
+    return opened

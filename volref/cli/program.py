@@ -25,6 +25,7 @@ from volref.cli import (
     report,
     stability,
     trace,
+    web,
 )
 from volref.cli.output import refuse
 from volref.cli.verb import BAD_USE, GOOD, example_lines
@@ -42,6 +43,7 @@ VERBS = (
     convert.VERB,
     precision.VERB,
     stability.VERB,
+    web.VERB,
     report.VERB,
 )
 

@@ -1,0 +1,7 @@
+// volref in a browser: capture a frame right, and judge it against a golden bundle.
+
+export { captureCanvas, captureTarget } from "./volref-capture.js";
+export { captureWebGPU } from "./volref-webgpu.js";
+export { readNpy, writeNpy } from "./volref-npy.js";
+export { writePng } from "./volref-png.js";
+export { saveMetadata, saveNpy, savePng } from "./volref-save.js";
