@@ -6,6 +6,10 @@
 // OUTSIDE_ABOVE    the ray ends after a sample beyond 1
 //
 // STEPS and OPAQUE_AT are defined by the page.
+//
+// Faults, each by a definition of its strength; the paper's own are those above:
+// FAULT_D1_WINDOW_Z      the depth of window coordinates takes the place of one that is linear along the view
+// FAULT_D1_RANGE         surfaces lie at so many times their depth: another far plane
 varying highp vec4 clip;
 varying highp vec3 front;
 uniform sampler2D mesh_depth;
@@ -57,6 +61,9 @@ void main() {
   float back_at = 1.0 - unpack_float(texture2D(back_depth, tex_d));
   float ray_depth = 1.0 - nearness();
   float surf_depth = 1.0 - unpack_float(texture2D(mesh_depth, tex_d));
+#ifdef FAULT_D1_RANGE
+  if (surf_depth < 1.0) surf_depth *= FAULT_D1_RANGE;
+#endif
   float depth_step = (back_at - ray_depth) / float(STEPS);
   vec3 place = front;
   vec4 accum = vec4(0.0);

@@ -4,6 +4,13 @@
 // NO_ASPECT          x is not stretched by the aspect (as printed)
 // NO_BACKGROUND      the colour is written as it is after gamma, with its own alpha (as printed)
 // DEEPEST_IN_FRONT   the base: jitter, each sample over those before it, no tone map, colour times alpha
+//
+// Faults, each by a definition of its strength:
+// FAULT_C1_SRGB_TWICE        gamma is applied twice
+// FAULT_C1_SRGB_NEVER        gamma is not applied
+// FAULT_C1_WRONG_SPACE       the background joins after gamma
+// FAULT_O2_ADD_ALPHA         alpha is added without what is in front
+// FAULT_B1_BLENDED_TWICE     colours are multiplied by alpha once more
 precision highp float;
 precision highp sampler2D;
 precision highp sampler3D;
@@ -61,7 +68,11 @@ vec4 with_sample(vec4 color, vec4 found) {
     color.a = found.a + (1.0 - found.a) * color.a;
 #else
     color.rgb += (1.0 - color.a) * found.a * found.rgb;
+#ifdef FAULT_O2_ADD_ALPHA
+    color.a += found.a;
+#else
     color.a += (1.0 - color.a) * found.a;
+#endif
 #endif
     return color;
 }
@@ -101,6 +112,12 @@ vec3 tone_mapped(vec3 light) {
 }
 
 vec3 encoded(vec3 light) {
+#ifdef FAULT_C1_SRGB_NEVER
+    return light;
+#endif
+#ifdef FAULT_C1_SRGB_TWICE
+    light = pow(light, vec3(1.0 / gamma));
+#endif
     return pow(light, vec3(1.0 / gamma));
 }
 
@@ -112,6 +129,9 @@ void main() {
     }
     vec4 color = marched(eye + along * t.x, eye + along * t.y);
     color.rgb = tone_mapped(color.rgb);
+#ifdef FAULT_B1_BLENDED_TWICE
+    color.rgb *= color.a;
+#endif
 #ifdef NO_BACKGROUND
     fragment = vec4(encoded(color.rgb), color.a);
 #else
@@ -120,5 +140,8 @@ void main() {
     color.rgb *= color.a;
 #endif
     fragment = vec4(encoded(color.rgb + behind), 1.0);
+#ifdef FAULT_C1_WRONG_SPACE
+    fragment.rgb = encoded(color.rgb) + (1.0 - color.a) * background;
+#endif
 #endif
 }

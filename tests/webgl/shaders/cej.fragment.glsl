@@ -7,6 +7,11 @@
 // LIGHTS               how many lights there are, if any
 // LAMBERT PHONG BLINN  the material, one of them
 // TWO_SIDED            cosines count from both sides
+//
+// Faults, each by a definition of its strength; the published code's own are ZERO_HALF and SKIP_FLAT:
+// FAULT_N1_SIGN              normals look into the surface
+// FAULT_N1_SPACE             normals and lights stay in texture space and in the world
+// FAULT_T1_NOT_RENORMALISED  what has more than alpha 1 stays as it is
 precision highp float;
 precision highp int;
 precision highp sampler2D;
@@ -69,6 +74,12 @@ vec3 illumination(vec3 place, vec3 gradient, vec3 along) {
     flat_ = length(gradient) < 0.001;
 #endif
     vec3 normal = normalize(normal_from_gradient * gradient);
+#ifdef FAULT_N1_SPACE
+    normal = normalize(gradient);
+#endif
+#ifdef FAULT_N1_SIGN
+    normal = -normal;
+#endif
     vec3 sum = vec3(0.0);
     for (int i = 0; i < LIGHTS; i++) {
         vec3 light = lights[i];
@@ -134,7 +145,9 @@ void main() {
         t += step_size;
     }
     if (sum.a > 1.0) {
+#ifndef FAULT_T1_NOT_RENORMALISED
         sum.rgb /= sum.a;
+#endif
     } else if (sum.a < 1.0) {
         sum += (1.0 - sum.a) * behind;
     }

@@ -2,6 +2,30 @@
 // The baseline: a slab test, a 3-D texture, steps of one world length with the sample in the middle.
 //
 // PARALLEL: rays without an eye.  MESHES: targets of the nearest mesh are read.
+//
+// Faults, each by a definition of its strength:
+// FAULT_G1_HALF_VOXEL             the volume is read so many voxels further along all axes
+// FAULT_G2_NODES_ON_FACES         the outer voxels lie on the faces
+// FAULT_G3_STEP_IN_TEXTURE_SPACE  lengths along the ray are those of texture space times the longest side
+// FAULT_G5_VANISHES_INSIDE        nothing is drawn with the eye in the box
+// FAULT_G6_BRICK_SEAMS            bricks of so many voxels know nothing of their neighbours
+// FAULT_O1_UNCORRECTED            the table's opacity is a sample's
+// FAULT_O1_STALE                  opacity is for a step so many times as long
+// FAULT_O2_ADD_ALPHA              alpha is added without what is in front
+// FAULT_O3_FACTOR_PER_SAMPLE      opacity times this at each sample
+// FAULT_O4_WORLD_SCALE            opacity is for a scene so many times as large
+// FAULT_O5_STRAIGHT_AS_PREMULTIPLIED  alpha is divided out before the canvas blends
+// FAULT_O5_TWICE_PER_SAMPLE       the table's colours are multiplied by its opacity, then by that of the step
+// FAULT_T2_...                    the first step, the last step: see the loop
+// FAULT_T3_LOOP_CAP               the loop ends after this share of the steps across the box
+// FAULT_T3_ONE_SIDED_EXIT         faces at 0 do not end a ray
+// FAULT_T4_STEP                   steps are so many times as long, their opacity is not
+// FAULT_L1_HALF_TEXEL             the table is read as if its outer entries were at 0 and 1
+// FAULT_C1_SRGB_TWICE             colours are encoded once more
+// FAULT_C1_SRGB_NEVER             colours are decoded, and not encoded again
+// FAULT_L3_PRE_CLASSIFIED         the volume holds colours and opacities
+// FAULT_M1_AVERAGE                samples are averaged
+// FAULT_O5_PREMULTIPLIED_TWICE    colours are multiplied by alpha once more
 precision highp float;
 precision highp sampler2D;
 precision highp sampler3D;
@@ -22,6 +46,66 @@ uniform sampler2D mesh_distance;
 uniform sampler2D mesh_color;
 #endif
 out vec4 result;
+
+// Where the volume is read for a place.
+vec3 read_at(vec3 place) {
+  vec3 size = vec3(textureSize(volume, 0));
+#ifdef FAULT_G1_HALF_VOXEL
+  place += FAULT_G1_HALF_VOXEL / size;
+#endif
+#ifdef FAULT_G2_NODES_ON_FACES
+  place = (place * (size - 1.0) + 0.5) / size;
+#endif
+#ifdef FAULT_G6_BRICK_SEAMS
+  vec3 first = floor(place * size / FAULT_G6_BRICK_SEAMS) * FAULT_G6_BRICK_SEAMS;
+  vec3 last = min(first + FAULT_G6_BRICK_SEAMS, size);
+  place = clamp(place * size, first + 0.5, last - 0.5) / size;
+#endif
+  return place;
+}
+
+// Straight colour and opacity of a unit distance.
+vec4 classified(vec3 place) {
+#ifdef FAULT_L3_PRE_CLASSIFIED
+  return texture(volume, read_at(place));
+#else
+  float value = texture(volume, read_at(place)).r;
+#ifdef FAULT_L1_HALF_TEXEL
+  float entries = float(textureSize(table, 0).x);
+  value = (value * (entries - 1.0) + 0.5) / entries;
+#endif
+  return texture(table, vec2(value, 0.5));
+#endif
+}
+
+// Opacity of a share of a step.
+float opacity_of(float alpha, float share) {
+  float lengths = share * step_length / unit_distance;
+#ifdef FAULT_O1_STALE
+  lengths *= FAULT_O1_STALE;
+#endif
+#ifdef FAULT_O4_WORLD_SCALE
+  lengths *= FAULT_O4_WORLD_SCALE;
+#endif
+  float opacity = 1.0 - pow(1.0 - alpha, lengths);
+#ifdef FAULT_O1_UNCORRECTED
+  opacity = alpha;
+#endif
+#ifdef FAULT_O3_FACTOR_PER_SAMPLE
+  opacity *= FAULT_O3_FACTOR_PER_SAMPLE;
+#endif
+  return opacity;
+}
+
+// Length of a ray from face to face.
+float length_of(vec3 ray) {
+#ifdef FAULT_G3_STEP_IN_TEXTURE_SPACE
+  vec3 sides = vec3(length(world_from_texture[0]), length(world_from_texture[1]), length(world_from_texture[2]));
+  return length(ray) * max(sides.x, max(sides.y, sides.z));
+#else
+  return length(world_from_texture * ray);
+#endif
+}
 
 void main() {
 #ifdef PARALLEL
@@ -47,6 +131,9 @@ void main() {
   t_far = min(t_far, texelFetch(mesh_distance, here, 0).r);
 #endif
   bool missed = !(t_near < t_far);
+#ifdef FAULT_G5_VANISHES_INSIDE
+  missed = missed || t_near == 0.0;
+#endif
   if (missed && object.a == 0.0) discard;
 
   vec3 color = vec3(0.0);
@@ -54,23 +141,78 @@ void main() {
   if (!missed) {
     vec3 entry = origin + t_near * direction;
     vec3 ray = origin + t_far * direction - entry;
-    float ray_length = length(world_from_texture * ray);
-    vec3 delta = ray / ray_length * step_length;
-    for (int i = 0; ; i++) {
-      float begin = float(i) * step_length;
+    float ray_length = length_of(ray);
+    float walked = step_length;
+#ifdef FAULT_T4_STEP
+    walked *= FAULT_T4_STEP;
+#endif
+    vec3 delta = ray / ray_length * walked;
+    int begin_at = 0;
+#ifdef FAULT_T2_FIRST_STEP_DROPPED
+    begin_at = 1;
+#endif
+#ifdef FAULT_M1_AVERAGE
+    vec4 sum = vec4(0.0);
+    float samples = 0.0;
+#endif
+    for (int i = begin_at; ; i++) {
+      float begin = float(i) * walked;
+#ifdef FAULT_T3_ONE_SIDED_EXIT
+      if (i > 0 && any(greaterThan(entry + delta * (float(i) - offset), vec3(1.0))) || i > 200) break;
+      ray_length = begin + walked;
+#endif
       if (!(begin < ray_length)) break;
-      float share = min(ray_length - begin, step_length) / step_length;
+#ifdef FAULT_T3_LOOP_CAP
+      if (begin >= FAULT_T3_LOOP_CAP * length(world_from_texture * vec3(1.0))) break;
+#endif
+      float share = min(ray_length - begin, walked) / walked;
+#ifdef FAULT_T2_LAST_STEP_DROPPED
+      if (ray_length - begin < walked) break;
+#endif
+#ifdef FAULT_T2_LAST_STEP_WHOLE
+      share = 1.0;
+#endif
       vec3 place = entry + delta * (float(i) + offset * share);
-      float value = texture(volume, place).r;
-      vec4 found = texture(table, vec2(value, 0.5));
-      float opacity = 1.0 - pow(1.0 - found.a, share * step_length / unit_distance);
+#ifdef FAULT_T2_LAST_STEP_DOUBLED
+      if (ray_length - begin <= walked) share *= 2.0;
+#endif
+      vec4 found = classified(place);
+      float opacity = opacity_of(found.a, share);
       float weight = (1.0 - alpha) * opacity;
+#ifdef FAULT_O5_TWICE_PER_SAMPLE
+      found.rgb *= found.a;
+#endif
       color += found.rgb * weight;
+#ifdef FAULT_O2_ADD_ALPHA
+      alpha += opacity;
+#else
       alpha += weight;
+#endif
+#ifdef FAULT_M1_AVERAGE
+      sum += vec4(found.rgb, 1.0) * found.a;
+      samples += 1.0;
+#else
       if (alpha >= opaque_at) break;
+#endif
     }
+#ifdef FAULT_M1_AVERAGE
+    color = sum.rgb / samples;
+    alpha = sum.a / samples;
+#endif
   }
   color += (1.0 - alpha) * object.rgb;
   alpha = object.a > 0.0 ? 1.0 : alpha;
+#ifdef FAULT_O5_STRAIGHT_AS_PREMULTIPLIED
+  color /= max(alpha, 1e-6);
+#endif
+#ifdef FAULT_O5_PREMULTIPLIED_TWICE
+  color *= alpha;
+#endif
+#ifdef FAULT_C1_SRGB_TWICE
+  color = mix(12.92 * color, 1.055 * pow(color, vec3(1.0 / 2.4)) - 0.055, step(0.0031308, color));
+#endif
+#ifdef FAULT_C1_SRGB_NEVER
+  color = mix(color / 12.92, pow((color + 0.055) / 1.055, vec3(2.4)), step(0.04045, color));
+#endif
   result = vec4(color, alpha);
 }

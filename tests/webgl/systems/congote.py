@@ -34,6 +34,8 @@ def draw(
     defines: dict[str, object] = {"STEPS": pipeline.stepping.steps, "OPAQUE_AT": pipeline.stepping.opaque_at}
     if pipeline.name.endswith("-printed"):
         defines["PRINTED"] = 1
+    if pipeline.volume.in_tile == "clamped":
+        defines["CLAMPED"] = 1
     uniforms = {
         "clip_from_texture": clip_from_texture(scene),
         "front_coordinates": "front_coordinates",
@@ -41,6 +43,7 @@ def draw(
         "atlas": "atlas",
         "table": "table",
         "tiles": (*uploads.tiles, uploads.size[2]),
+        "tile_size": uploads.size[:2],
         "opacity_factor": factor_of(scene, pipeline, box_of(scene)),
         "light_factor": pipeline.lighting.factor,
     }

@@ -54,6 +54,7 @@ def mesh_passes(scene: Scene, pipeline: Pipeline) -> tuple[dict[str, Target], tu
         "view_from_world": float32(scene.camera.view_from_world),
         "clip_from_view": float32(scene.camera.clip_from_view(scene.width, scene.height)),
         "near": scene.camera.near,
+        "far": scene.camera.far,
     }
     clears = {"mesh_distance": (float(NOWHERE), 0.0, 0.0, 0.0), "mesh_color": (0.0, 0.0, 0.0, 0.0)}
     passes = [
