@@ -54,6 +54,7 @@ if TYPE_CHECKING:
     from volref.oracle.accepting import accept
     from volref.oracle.metrics import Comparison, compare
     from volref.oracle.tracing import trace
+    from volref.oracle.verdict import Verdict, check
     from volref.phantoms.transfer import dbz_transfer
     from volref.planning import Plan, plan
     from volref.scene import (
@@ -112,12 +113,14 @@ __all__ = [
     "Trace",
     "TransferFunction",
     "TransferFunction2D",
+    "Verdict",
     "Verification",
     "Volume",
     "accept",
     "arcball_rotation",
     "axis_slice",
     "cappi",
+    "check",
     "clip_box",
     "compare",
     "convert_volume",
@@ -179,6 +182,7 @@ _HOMES = {
     "volref.oracle.accepting": ("accept",),
     "volref.oracle.metrics": ("Comparison", "compare"),
     "volref.oracle.tracing": ("trace",),
+    "volref.oracle.verdict": ("Verdict", "check"),
     "volref.phantoms.transfer": ("dbz_transfer",),
     "volref.planning": ("Plan", "plan"),
     "volref.scene": (

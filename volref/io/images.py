@@ -49,7 +49,7 @@ def read_image(
     FormatError
         If the file is no such image; 16-bit colour PNG is refused.
     """
-    codes = _read_codes(existing_file(path), max_bytes)
+    codes = read_codes(path, max_bytes)
     whole = codes.dtype.kind in "iu"
     encoding = one_of("encoding", encoding or ("srgb" if whole else "none"), ENCODINGS)
     alpha = one_of("alpha", alpha or ("straight" if whole else "premultiplied"), ALPHAS)
@@ -60,6 +60,40 @@ def read_image(
     straight = straight_from_premultiplied(rgba) if alpha == "premultiplied" else rgba
     straight[..., :3] = decode_light(straight[..., :3], encoding)
     return premultiplied_from_straight(straight)
+
+
+def read_codes(path: str | Path, max_bytes: int = DEFAULT_MAX_BYTES) -> Numbers:
+    """Return what a .png, .exr, .npy or .npz file holds: (height, width[, 3 or 4]) codes or floats.
+
+    Nothing is scaled, decoded or multiplied.
+
+    Raises
+    ------
+    FormatError
+        If the file is no such image.
+    """
+    file = existing_file(path)
+    suffix = file.suffix.lower()
+    if suffix == ".png":
+        return read_png(file, max_bytes)
+    if suffix == ".exr":
+        codes = read_exr(file, max_bytes)
+        codes = codes[..., 0] if codes.shape[2] == 1 else codes
+    elif suffix == ".npy":
+        codes = read_npy(file, max_bytes)
+    elif suffix == ".npz":
+        name = chosen_array(file, npz_headers(file), None, "rgba", 3)
+        codes = read_npz(file, (name,), max_bytes)[name]
+    else:
+        message = f"{one_line(file.name)} must end in .png, .exr, .npy or .npz, got {suffix!r}; "
+        raise FormatError(message + "convert it to PNG")
+    image = codes.ndim == 2 or (codes.ndim == 3 and codes.shape[2] in (3, 4))
+    if not image or codes.dtype.kind not in "uf":
+        message = (
+            f"{file.name} must hold an image (height, width[, 3 or 4]) of unsigned integers or floats, got "
+        )
+        raise FormatError(message + f"{codes.dtype} of shape {codes.shape}; save another array")
+    return codes
 
 
 def write_image(path: str | Path, rgba: Floats, *, encoding: str = "srgb", overwrite: bool = False) -> None:
@@ -85,30 +119,6 @@ def write_image(path: str | Path, rgba: Floats, *, encoding: str = "srgb", overw
     else:
         message = f"{one_line(Path(path).name)} must end in .png, .exr, .npy or .npz, got {suffix!r}; "
         raise FormatError(message + "rename it")
-
-
-def _read_codes(file: Path, max_bytes: int) -> Numbers:
-    suffix = file.suffix.lower()
-    if suffix == ".png":
-        return read_png(file, max_bytes)
-    if suffix == ".exr":
-        codes = read_exr(file, max_bytes)
-        codes = codes[..., 0] if codes.shape[2] == 1 else codes
-    elif suffix == ".npy":
-        codes = read_npy(file, max_bytes)
-    elif suffix == ".npz":
-        name = chosen_array(file, npz_headers(file), None, "rgba", 3)
-        codes = read_npz(file, (name,), max_bytes)[name]
-    else:
-        message = f"{one_line(file.name)} must end in .png, .exr, .npy or .npz, got {suffix!r}; "
-        raise FormatError(message + "convert it to PNG")
-    image = codes.ndim == 2 or (codes.ndim == 3 and codes.shape[2] in (3, 4))
-    if not image or codes.dtype.kind not in "uf":
-        message = (
-            f"{file.name} must hold an image (height, width[, 3 or 4]) of unsigned integers or floats, got "
-        )
-        raise FormatError(message + f"{codes.dtype} of shape {codes.shape}; save another array")
-    return codes
 
 
 def _four_channels(unit: Numbers) -> Numbers:

@@ -91,7 +91,9 @@ class Acceptance:
         nominal = float_array("image", unit, ("height", "width", 4))
         slack = number("tolerance", tolerance, low=0)
         lo, hi = nominal - slack, nominal + slack
-        marked = np.zeros(nominal.shape[:2], np.bool_)
+        height, width = nominal.shape[:2]
+        marked: Booleans = np.zeros((height, width), np.bool_)
+        drawn: Booleans = np.asarray(nominal.any(axis=-1))
         # Numbers as they are: no canvas is known that would round them.
         program = Pipeline("none", output=Output(format="exact"))
         return cls(
@@ -101,7 +103,7 @@ class Acceptance:
             lo,
             hi,
             marked,
-            nominal.any(axis=-1),
+            drawn,
             {},
             "",
             program,
