@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 import volref as vr
 from tests.emulation.scenes import example
-from tests.oracle.intervals import ROUNDINGS, acceptance_of, byte_intervals, encoded, sent
+from tests.oracle.made_up import ROUNDINGS, acceptance_of, byte_intervals, encoded, sent
 from volref.io import write_png
 
 SEEDS = st.integers(0, 10**6)
