@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from typing import NoReturn
 
 from volref.cli import (
+    charts,
     compare,
     convert,
     demo,
@@ -39,6 +40,7 @@ VERBS = (
     emulate.VERB,
     pipelines.VERB,
     compare.VERB,
+    charts.VERB,
     info.VERB,
     convert.VERB,
     precision.VERB,
