@@ -51,6 +51,7 @@ if TYPE_CHECKING:
         write_image,
     )
     from volref.oracle.acceptance import Acceptance
+    from volref.oracle.acceptance_files import load_acceptance, save_acceptance
     from volref.oracle.accepting import accept
     from volref.oracle.metrics import Comparison, compare
     from volref.oracle.tracing import trace
@@ -129,6 +130,7 @@ __all__ = [
     "drag",
     "emulate",
     "jitter_images",
+    "load_acceptance",
     "load_camera",
     "load_candidates",
     "load_device",
@@ -153,6 +155,7 @@ __all__ = [
     "render_jittered",
     "render_series",
     "resample_radar",
+    "save_acceptance",
     "save_camera",
     "save_mesh",
     "save_radar",
@@ -179,6 +182,7 @@ _HOMES = {
     "volref.emulation.result": ("Emulation",),
     "volref.errors": ("FormatError", "SceneError"),
     "volref.oracle.acceptance": ("Acceptance",),
+    "volref.oracle.acceptance_files": ("load_acceptance", "save_acceptance"),
     "volref.oracle.accepting": ("accept",),
     "volref.oracle.metrics": ("Comparison", "compare"),
     "volref.oracle.tracing": ("trace",),
