@@ -227,6 +227,15 @@ def test_what_is_not_a_number_is_outside_and_is_said():
     found = vr.check(image, acceptance_of(np.zeros((2, 3, 4)), np.ones((2, 3, 4))))
     assert np.argwhere(found.outside).tolist() == [[0, 1], [1, 2]]
     assert "the worst is pixel (1, 0), alpha nan, which is no number" in found.message
+
+
+@pytest.mark.parametrize("no_number", [np.nan, np.inf, -np.inf])
+def test_an_alpha_that_is_no_number_is_outside_whatever_its_colours_were_divided_by(no_number):
+    image = np.full((2, 3, 4), 0.5)
+    image[0, 1] = (0.5, 0.5, 0.0, no_number)
+    found = vr.check(image, acceptance_of(np.zeros((2, 3, 4)), np.ones((2, 3, 4))), alpha="straight")
+    assert np.argwhere(found.outside).tolist() == [[0, 1]]
+    assert f"the worst is pixel (1, 0), alpha {no_number}, which is no number" in found.message
     plain = json.loads(json.dumps(found.as_dict(), allow_nan=False))
     assert (plain["worst"]["excess"], plain["worst"]["value"]) == (None, None)
 

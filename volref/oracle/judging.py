@@ -70,11 +70,12 @@ class Worst:
 
 def judged(candidate: Candidate, acceptance: Acceptance, delivery: Delivery, left_out: Booleans) -> Judgement:
     """Return how a candidate of the right size lies in the intervals, if it was delivered so."""
-    lo, hi = delivered(acceptance, candidate, delivery)
-    numbers = candidate.numbers[..., : lo.shape[-1]]
     with np.errstate(invalid="ignore"):
+        lo, hi = delivered(acceptance, candidate, delivery)
+        numbers = candidate.numbers[..., : lo.shape[-1]]
         beyond = np.maximum(np.maximum(lo - numbers, numbers - hi), 0.0)
-    beyond = np.where(np.isfinite(numbers), beyond, np.inf)
+    # An alpha that is no number leaves its colours without an interval; it is found by its own channel.
+    beyond = np.where(np.isfinite(numbers), np.nan_to_num(beyond, nan=0.0, posinf=np.inf), np.inf)
     return Judgement(beyond / (candidate.levels or 1), (lo, hi), left_out)
 
 

@@ -278,7 +278,8 @@ def _shown(
     image: Candidate, acceptance: Acceptance, asked: Delivery, left_out: Booleans
 ) -> tuple[Floats, Floats]:
     """Return the canvas that the candidate shows and the nominal one, in as many channels."""
-    numbers = canvas_numbers(image, asked, canvas_alpha(acceptance.pipeline))
+    with np.errstate(invalid="ignore"):  # a colour of 0 times an alpha that is infinite
+        numbers = canvas_numbers(image, asked, canvas_alpha(acceptance.pipeline))
     nominal = acceptance.nominal[..., : numbers.shape[-1]]
     return np.where(left_out[..., None], nominal, numbers), nominal
 
