@@ -19,7 +19,13 @@ NUMBERS = {
     "stepping.cap": 7,
     "stepping.opaque_at": 0.3,
     "volume.tiles_across": 3,
+    "stepping.skipped": 1,
+    "volume.shift": 0.5,
+    "volume.brick": 4,
     "volume.padding": 1,
+    "table.shift": 0.5,
+    "opacity.times": 0.5,
+    "meshes.scale": 1.2,
     "table.rows": 8,
     "table.steepest": 30.0,
     "opacity.factor": 0.3,
@@ -55,6 +61,7 @@ SHOWN = {
     "stepping.jitter": ("cej2020", {}, "plain"),
     "stepping.last_step": ("texture3d", {}, "plain"),
     "stepping.opaque_test": ("mpilia2018", {}, "plain"),
+    "stepping.stopped": ("texture3d", {"stepping": {"opaque_at": 0.3}}, "plain"),
     "volume.first_tile": ("congote2012", {}, "plain"),
     "volume.geometry": ("congote2012-radar", {}, "radar"),
     "volume.rows": ("congote2012", {}, "plain"),
@@ -74,6 +81,7 @@ SHOWN = {
     "meshes.kind=depth": ("congote2012", {}, "plain"),
     "lighting.model": ("cej2020", {}, "plain"),
     "lighting.space": ("cej2020", {}, "plain"),
+    "lighting.normals": ("cej2020", {}, "plain"),
     "lighting.zero": ("cej2020", {}, "plain"),
     "accumulation.normalize": (
         "congote2012",
@@ -85,6 +93,8 @@ SHOWN = {
         "plain",
     ),
     "meshes.kind": ("texture3d", {}, "mesh"),
+    "meshes.measure": ("texture3d", {}, "mesh"),
+    "meshes.scale": ("texture3d", {}, "mesh"),
     **{
         f"meshes.{name}": ("arbelaz2016", {}, "mesh")
         for name in ("depth", "packing", "comparison", "composition", "format")

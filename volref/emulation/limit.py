@@ -111,10 +111,22 @@ def refined(scene: Scene, pipeline: Pipeline, times: int) -> Pipeline:
 
 def _refuse_printed(scene: Scene, pipeline: Pipeline) -> None:
     """Refuse programs whose image is not that of an emission-absorption integral at any step."""
-    volume, table = pipeline.volume, pipeline.table
+    volume, table, stepping = pipeline.volume, pipeline.table, pipeline.stepping
     reasons = {
         "alpha is added without what is in front": pipeline.accumulation.rule.startswith("add-"),
         "deeper samples lie in front": pipeline.accumulation.rule == "reversed-over",
+        "samples are gathered, not composited": pipeline.accumulation.rule in ("mean", "greatest"),
+        "colours are taken for premultiplied": pipeline.accumulation.color == "premultiplied"
+        or table.premultiplied,
+        "opacity hangs on more than the step's length in the world": pipeline.opacity.times != 1.0
+        or pipeline.opacity.rule.startswith("corrected-"),
+        "voxels are read beside their places": volume.reach != "faces"
+        or volume.shift != 0
+        or volume.brick is not None,
+        "the table is read beside its places": table.shift != 0,
+        "steps are left out or taken twice": stepping.skipped > 0 or stepping.last_step == "doubled",
+        "surfaces lie elsewhere": bool(scene.meshes)
+        and (pipeline.meshes.measure != "distance" or pipeline.meshes.scale != 1.0),
         "the tiles of the atlas are mixed up": volume.tile_row != "columns"
         or volume.second_column != "fract",
         "slices are mixed by x": volume.between == "x",

@@ -114,9 +114,11 @@ class Stepping(Switches, group="pipeline.stepping"):
                 "whole": "as long as the others",
                 "partial": "what is left up to the exit",
                 "dropped": "left out",
+                "doubled": "what is left up to the exit, counted twice",
             },
         ),
     ] = "partial"
+    skipped: Annotated[int, Whole("steps at the entry that are left out", high=1 << 16)] = 0
     opaque_at: Annotated[float | None, Real("alpha that ends a ray (None: none)", high=2.0)] = None
     opaque_test: Annotated[
         str,
@@ -125,3 +127,10 @@ class Stepping(Switches, group="pipeline.stepping"):
             {"at-least": "alpha >= opaque_at", "above": "alpha > opaque_at"},
         ),
     ] = "at-least"
+    stopped: Annotated[
+        str,
+        Word(
+            "what becomes of a ray that alpha has ended",
+            {"left": "nothing", "opaque": "its alpha is set to 1, and its colour left as it is"},
+        ),
+    ] = "left"

@@ -23,13 +23,16 @@ class SampleOpacity(Switches, group="pipeline.opacity"):
                 "per-step": "a factor / steps",
                 "per-length": "a factor length, the step's length in texture space",
                 "corrected": "1 - (1 - a)^(factor length / unit distance), the step's length in the world",
+                "corrected-in-texture": "the same of its length in texture space times the longest side",
+                "corrected-by-ray": "the same of the mean side times the share that a step is of its ray",
             },
         ),
     ] = "corrected"
     factor: Annotated[
         float | None,
-        Real("the factor (None: 1 for 'as-is' and 'corrected', else mean side / unit distance)"),
+        Real("the factor (None: mean side / unit distance for 'per-step' and 'per-length', else 1)"),
     ] = None
+    times: Annotated[float, Real("what a sample's opacity is multiplied by at last")] = 1.0
     by_gradient: Annotated[
         float, Real("the factor by which |g| of a gradient texture multiplies it; 0: it does not")
     ] = 0.0
@@ -84,6 +87,18 @@ class Lighting(Switches, group="pipeline.lighting"):
             },
         ),
     ] = "ambient"
+    normals: Annotated[
+        str,
+        Word(
+            "what normals are",
+            {
+                "outward": "unit vectors towards lesser values, 0 without a gradient",
+                "inward": "unit vectors towards greater values: the wrong sign",
+                "untransformed": "unit vectors along the gradient per voxel, taken for one in the world",
+                "unguarded": "gradients divided by their length, not a number where that is 0",
+            },
+        ),
+    ] = "outward"
     space: Annotated[
         str,
         Word(
@@ -110,9 +125,18 @@ class Accumulation(Switches, group="pipeline.accumulation"):
                 "add-alpha": "C += (1 - A) a c; A += a, seed 001's eq. 4 and seed 002's article",
                 "add-clamped": "C += (1 - A) a c; A = min(A + a, 1), VPT's DOS",
                 "reversed-over": "C = a c + (1 - a) A C; A = a + (1 - a) A: the deepest sample lies in front",
+                "mean": "C += a c / n; A += a / n, n the ray's length in steps",
+                "greatest": "C = a c; A = a, of the sample whose a is greatest",
             },
         ),
     ] = "over"
+    color: Annotated[
+        str,
+        Word(
+            "what c is taken for",
+            {"straight": "straight: it is added times a", "premultiplied": "premultiplied: without a"},
+        ),
+    ] = "straight"
     alpha: Annotated[
         str,
         Word(

@@ -30,9 +30,22 @@ class MeshCut(Switches, group="pipeline.meshes"):
             {
                 "linear": "(distance along the view - near) / (far - near)",
                 "window-over-w": "1 - window z / clip w, which is not linear along a ray, seed 000",
+                "window": "window z, which is not either",
             },
         ),
     ] = "linear"
+    measure: Annotated[
+        str,
+        Word(
+            "what is taken for the world distance",
+            {
+                "distance": "the distance from the ray's origin",
+                "view": "the distance along the view",
+                "window": "near + window z (far - near)",
+            },
+        ),
+    ] = "distance"
+    scale: Annotated[float, Real("what distances and depths of surfaces are multiplied by")] = 1.0
     packing: Annotated[
         str,
         Word(

@@ -31,6 +31,20 @@ class VolumeTexture(Switches, group="pipeline.volume"):
         ),
     ] = "red"
     filter: Annotated[str, Word("how texels are fetched", FILTERS)] = "linear"
+    reach: Annotated[
+        str,
+        Word(
+            "what 0 and 1 of the box are in the texture",
+            {"faces": "its edges", "centers": "the centres of its outer voxels"},
+        ),
+    ] = "faces"
+    shift: Annotated[
+        float, Real("voxels by which each sample is read further along all axes", low=-1e4, high=1e4)
+    ] = 0.0
+    brick: Annotated[
+        int | None,
+        Whole("voxels along a side of bricks that know nothing of their neighbours (None: one brick)", low=1),
+    ] = None
     tiles_across: Annotated[
         int | None, Whole("tiles in a row of an atlas (None: as square as can be)", low=1)
     ] = None
@@ -176,6 +190,8 @@ class TableTexture(Switches, group="pipeline.table"):
             {"direct": "at v", "centered": "at (v (n - 1) + 1/2) / n"},
         ),
     ] = "direct"
+    shift: Annotated[float, Real("entries by which it is read further", low=-1e4, high=1e4)] = 0.0
+    premultiplied: Annotated[bool, Flag("whether its colours are multiplied by its opacity")] = False
     srgb: Annotated[bool, Flag("whether the texture decodes its colours from sRGB")] = False
     last_column: Annotated[
         str,

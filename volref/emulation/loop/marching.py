@@ -123,6 +123,9 @@ def march(program: Program, observe: Observer | None = None, rays: Indices | Non
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         for first in range(0, len(chosen), CHUNK):
             _run(program, chosen[first : first + CHUNK], result, work, observe)
+    stepping = program.textures.pipeline.stepping
+    if stepping.stopped == "opaque" and stepping.opaque_at is not None:
+        result.alpha[_is_opaque(stepping, result.alpha)] = 1
     return result
 
 
@@ -139,7 +142,8 @@ def _run(program: Program, rays: Indices, result: Marched, work: Workspace, obse
         if program.shade is not None:
             found = found._replace(color=program.shade(position, found, walk.ray))
         opacity = program.rule.opacity(found, walk.ray, share)
-        _accumulate(program, walk, found, opacity)
+        if number >= stepping.skipped:
+            _accumulate(program, walk, found, opacity)
         if observe is not None:
             seen = Sample(number, walk.ray, position, found, opacity, share, walk.color, walk.alpha)
             observe(seen)
@@ -224,11 +228,14 @@ def _place(program: Program, walk: _Walk, number: int) -> tuple[Floats, Floats |
     if stepping.advance == "parameter":
         return mix(program.textures.device, paths.entry, paths.exit, walk.walked), None
     share = None
-    if stepping.last_step == "partial" and stepping.end == "length-before":
+    if stepping.last_step in ("partial", "doubled") and stepping.end == "length-before":
         left = paths.length - kind(number) * paths.step
         share = np.minimum(left, paths.step) / paths.step
     place = walk.offset if share is None else walk.offset * share
-    return paths.entry + paths.delta * (kind(number) + place), share
+    position = paths.entry + paths.delta * (kind(number) + place)
+    if share is not None and stepping.last_step == "doubled":
+        share = np.where(left <= paths.step, share + share, share)
+    return position, share
 
 
 def _advance(stepping: Stepping, walk: _Walk) -> None:
@@ -252,10 +259,14 @@ def _ended_after(stepping: Stepping, walk: _Walk, sampled: Floats) -> Booleans:
     else:
         ended = np.zeros(len(walk.ray), np.bool_)
     if stepping.opaque_at is not None:
-        threshold = walk.alpha.dtype.type(stepping.opaque_at)
-        opaque = walk.alpha > threshold if stepping.opaque_test == "above" else walk.alpha >= threshold
-        ended = np.logical_or(ended, opaque)
+        ended = np.logical_or(ended, _is_opaque(stepping, walk.alpha))
     return ended
+
+
+def _is_opaque(stepping: Stepping, alpha: Floats) -> Booleans:
+    assert stepping.opaque_at is not None
+    threshold = alpha.dtype.type(stepping.opaque_at)
+    return np.asarray(alpha > threshold if stepping.opaque_test == "above" else alpha >= threshold)
 
 
 def _met(cut: Cut, walk: _Walk, result: Marched) -> Booleans:
@@ -278,8 +289,12 @@ def _accumulate(program: Program, walk: _Walk, found: Found, opacity: Floats) ->
         share = opacity.astype(walk.walked.dtype)
         walk.alpha = share + (share.dtype.type(1) - share) * walk.alpha.astype(share.dtype)
         return
+    if rule in ("mean", "greatest"):
+        _gather(program, walk, color, opacity)
+        return
     weight = (kind(1) - walk.alpha) * opacity
-    shining = weight if light == 1.0 else weight * kind(light)
+    shown = kind(1) - walk.alpha if pipeline.accumulation.color == "premultiplied" else weight
+    shining = shown if light == 1.0 else shown * kind(light)
     walk.color += color[:3] * shining
     if pipeline.accumulation.alpha == "weighted":
         own = found.value if pipeline.opacity.source == "value" else color[3]
@@ -287,3 +302,15 @@ def _accumulate(program: Program, walk: _Walk, found: Found, opacity: Floats) ->
     walk.alpha = walk.alpha + (weight if rule == "over" else opacity)
     if rule == "add-clamped":
         np.minimum(walk.alpha, kind(1), out=walk.alpha)
+
+
+def _gather(program: Program, walk: _Walk, color: Floats, opacity: Floats) -> None:
+    """Add samples to a walk whose result does not hang on their order: the mean, or the most opaque."""
+    kind = opacity.dtype.type
+    lit = color[:3] * (opacity * kind(program.textures.pipeline.lighting.factor))
+    if program.textures.pipeline.accumulation.rule == "mean":
+        share = (walk.paths.step / walk.paths.length).astype(kind)
+        walk.color, walk.alpha = walk.color + lit * share, walk.alpha + opacity * share
+        return
+    greater = opacity > walk.alpha
+    walk.color, walk.alpha = np.where(greater, lit, walk.color), np.where(greater, opacity, walk.alpha)

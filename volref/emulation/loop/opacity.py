@@ -6,6 +6,8 @@ n samples.  L: the step's length in texture space, l: in the world, d0: the tran
     per-step     factor a / steps
     per-length   factor a L
     corrected    1 - (1 - a)^(factor l / d0)
+    corrected-in-texture    L s for l, s the longest side
+    corrected-by-ray        m / n for l, m the mean side, n the ray's length in steps
 
 The second and third are corrected in first order only, for an opacity of 1 - e^(-a ...) about a ... .
 """
@@ -31,10 +33,13 @@ class OpacityRule:
     corrected: bool
     scale: Floats
     by_gradient: float = 0.0
+    times: float = 1.0
 
     def opacity(self, found: Found, ray: Indices, share: Floats | None) -> Floats:
         """Return the opacity (n,) of samples on rays `ray` (n,) whose step is `share` (n,) of a whole one."""
         opacity = self._by_step(found.value if self.source == "value" else found.color[3], ray, share)
+        if self.times != 1.0:
+            opacity = opacity * opacity.dtype.type(self.times)
         if not self.by_gradient:
             return opacity
         assert found.magnitude is not None
@@ -60,10 +65,25 @@ def opacity_rule(scene: Scene, pipeline: Pipeline, box: Box, paths: Paths, devic
         scale = scale / pipeline.stepping.steps
     elif switches.rule == "per-length":
         scale = factor * paths.texture_step
-    elif switches.rule == "corrected":
-        scale = factor * paths.world_step / scene.transfer.unit_distance
-    corrected = switches.rule == "corrected"
-    return OpacityRule(switches.source, corrected, scale.astype(kind), switches.by_gradient)
+    elif switches.rule != "as-is":
+        scale = factor * _meant_length(switches.rule, box, paths) / scene.transfer.unit_distance
+    corrected = switches.rule.startswith("corrected")
+    return OpacityRule(switches.source, corrected, scale.astype(kind), switches.by_gradient, switches.times)
+
+
+def _meant_length(rule: str, box: Box, paths: Paths) -> Floats:
+    """Return the length (R,) for which a rule corrects."""
+    if rule == "corrected-in-texture":
+        return np.asarray(paths.texture_step * float(box.sides.max()))
+    if rule == "corrected-by-ray":
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.asarray(steps_per_ray(paths) ** -1.0 * float(box.sides.mean()))
+    return paths.world_step
+
+
+def steps_per_ray(paths: Paths) -> Floats:
+    """Return how many steps (R,) long rays are, a number with a fraction."""
+    return np.asarray(paths.length / paths.step)
 
 
 def factor_of(scene: Scene, pipeline: Pipeline, box: Box) -> float:
@@ -75,7 +95,7 @@ def factor_of(scene: Scene, pipeline: Pipeline, box: Box) -> float:
     switches, stepping = pipeline.opacity, pipeline.stepping
     if switches.factor is not None:
         return switches.factor
-    if switches.rule in ("as-is", "corrected"):
+    if switches.rule not in ("per-step", "per-length"):
         return 1.0
     assert scene.transfer is not None
     side = float(box.sides.mean()) / scene.transfer.unit_distance

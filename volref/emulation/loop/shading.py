@@ -124,15 +124,31 @@ def shader_of(scene: Scene, textures: Textures, box: Box, ends: Ends) -> Shader 
     if lighting.model == "none" or not scene.lights_volume:
         skips = has_gradient_volume(lighting) and lighting.flat == "skipped"
         return _left_out if skips else None
-    in_texture_space = lighting.model == "cej" and lighting.space == "texture"
-    place = (_texture_space if in_texture_space else _world)(scene, textures, box, ends)
-    material = scene.material or Material()
+    place = place_of(scene, textures, box, ends)
     if lighting.model == "lit":
-        return partial(_lit, textures, place, scene.lights, material)
+        return partial(_lit, textures, place, scene.lights, scene.material or Material())
+    return partial(_cej, textures, place, lights_of(scene, place))
+
+
+def place_of(scene: Scene, textures: Textures, box: Box, ends: Ends) -> Place:
+    """Return the space in which a program lights the samples of rays."""
+    lighting = textures.pipeline.lighting
+    in_texture_space = lighting.model == "cej" and lighting.space == "texture"
+    return (_texture_space if in_texture_space else _world)(scene, textures, box, ends)
+
+
+def lights_of(scene: Scene, place: Place) -> Lights:
+    """Return the lights of a scene as those of model "cej".
+
+    Raises
+    ------
+    SceneError
+        If that model has no such light.
+    """
     ambient = [light.color for light in scene.lights if light.kind == "ambient"]
     uniform = np.sum(ambient, axis=0) if ambient else np.zeros(3)
     lamps = tuple(lamp_of(light, place) for light in scene.lights if light.kind != "ambient")
-    return partial(_cej, textures, place, Lights(uniform[:, None], lamps, material))
+    return Lights(uniform[:, None], lamps, scene.material or Material())
 
 
 def lamp_of(light: Light, place: Place) -> Lamp:
@@ -247,8 +263,14 @@ def _surface(textures: Textures, place: Place, position: Floats, found: Found) -
     """Return points and unit normals (3, n), towards lesser values; 0 where there is no gradient."""
     points = transform_points(place.points, position.T.astype(textures.device.values_type)).T
     gradient = found.gradient if found.gradient is not None else _differences(textures, position, found)
-    _, normals = length_and_direction(in_world(gradient, place.normals))
-    if found.magnitude is not None and textures.pipeline.lighting.flat == "ambient":
+    rule = textures.pipeline.lighting.normals
+    turned = gradient if rule == "untransformed" else in_world(gradient, place.normals)
+    length, normals = length_and_direction(turned)
+    if rule == "inward":
+        normals = -normals
+    if rule == "unguarded":
+        normals = np.where(length > 0, normals, np.nan)
+    elif found.magnitude is not None and textures.pipeline.lighting.flat == "ambient":
         normals = np.where(found.magnitude < FLAT, 0, normals)
     return points, normals
 

@@ -46,7 +46,7 @@ def mesh_targets(
             ),
         }
     elif kind == "distance" and len(scene.meshes):
-        far = distances(surfaces, scene.camera).astype(device.control_type)
+        far = _measured(scene, pipeline, surfaces).astype(device.control_type)
         targets = {
             "mesh_distance": _target(scene, surfaces.pixel, far[:, None], clear=NOWHERE),
             "mesh_color": _color_target(scene, pipeline, device, surfaces),
@@ -81,9 +81,23 @@ def cut_rays(
         kind(1) - unpacked(targets[name][ends.pixel], switches.packing)
         for name in ("mesh_depth", "back_depth")
     )
+    if switches.scale != 1.0:
+        surface = np.where(surface < 1, surface * kind(switches.scale), surface)
     depth = kind(1) - near[ends.pixel]
     step = (back - depth) / kind(pipeline.stepping.steps)
     return ends, Cut(depth, step, surface, switches.comparison == "one-step-early")
+
+
+def _measured(scene: Scene, pipeline: Pipeline, surfaces: Surfaces) -> Floats:
+    """Return what (F,) a program takes for the world distance of fragments."""
+    camera, measure = scene.camera, pipeline.meshes.measure
+    if measure == "view":
+        found = -surfaces.view[2]
+    elif measure == "window":
+        found = camera.near + surfaces.window_z.astype(np.float64) * (camera.far - camera.near)
+    else:
+        found = distances(surfaces, camera)
+    return np.asarray(found * pipeline.meshes.scale)
 
 
 def _face_nearness(scene: Scene, pipeline: Pipeline, box: Box, device: Device, face: Fragments) -> Floats:
@@ -99,6 +113,8 @@ def _nearness(
     kind = device.control_type
     if pipeline.meshes.depth == "window-over-w":
         return np.asarray(window_z.astype(kind) * inverse_w.astype(kind))
+    if pipeline.meshes.depth == "window":
+        return np.asarray(kind(1) - window_z.astype(kind))
     near, far = kind(scene.camera.near), kind(scene.camera.far)
     return np.asarray((far + view[2].astype(kind)) / (far - near))
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from volref.arrays import Floats
 from volref.emulation.device import Device
+from volref.emulation.groups import VolumeTexture
 from volref.emulation.pipeline import Pipeline
 from volref.emulation.textures.gradient_volume import has_gradient_volume, unpacked
 from volref.emulation.textures.mipmaps import classified_in_quads, levels_of
@@ -61,6 +62,7 @@ def look_up(textures: Textures, position: Floats, work: Workspace) -> Found:
     order = textures.pipeline.table.order
     if textures.grid is not None:
         return _between_sweeps(textures, textures.grid, position, work)
+    position = read_at(textures.pipeline.volume, textures.size, position)
     if textures.pipeline.volume.layout == "3d":
         found = fetch(textures.volume, position, work)
         if order == "pre":
@@ -83,6 +85,32 @@ def look_up(textures: Textures, position: Floats, work: Workspace) -> Found:
     else:
         value = _between(textures, *fetch_slices(textures.volume, *pair[3:], work), pair)
     return Found(value, classified(textures, value, work))
+
+
+def read_at(switches: VolumeTexture, size: tuple[int, int, int], position: Floats) -> Floats:
+    """Return where in the texture a program reads for positions (3, n) in the box.
+
+    Examples
+    --------
+    Bricks of 2 voxels out of 4: at the border between them, the voxel on the other side is not seen.
+
+    >>> border = np.full((3, 1), 0.501)
+    >>> read_at(VolumeTexture(brick=2), (4, 4, 4), border).ravel().tolist()
+    [0.625, 0.625, 0.625]
+    """
+    if switches.reach == "faces" and not switches.shift and switches.brick is None:
+        return position
+    kind, count = position.dtype.type, np.array(size, position.dtype)[:, None]
+    if switches.reach == "centers":
+        position = (position * (count - kind(1)) + kind(0.5)) / count
+    if switches.shift:
+        position = position + kind(switches.shift) / count
+    if switches.brick is not None:
+        side, voxel = kind(switches.brick), position * count
+        first = np.clip(np.floor(voxel / side) * side, kind(0), count - kind(1))
+        last = np.minimum(first + side, count)
+        position = np.clip(voxel, first + kind(0.5), last - kind(0.5)) / count
+    return position
 
 
 def classified(textures: Textures, value: Floats, work: Workspace, magnitude: Floats | None = None) -> Floats:

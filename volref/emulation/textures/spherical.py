@@ -64,15 +64,23 @@ def sweep_pair(
     >>> seen.item(), pair.first.item(), [round(part.item(), 6) for part in pair[2:]]
     (True, 1.0, [0.5, 0.125, 0.375, 0.125, 0.625])
     """
-    kind = position.dtype.type
     printed = switches.geometry == "spherical-printed"
     r, phi, theta = spherical(position, device, printed=printed)
+    tilt = position.dtype.type(np.pi / 2) - theta
+    return placed_between(switches, grid, (position, r, phi), tilt)
+
+
+def placed_between(
+    switches: VolumeTexture, grid: PolarGrid, place: tuple[Floats, Floats, Floats], tilt: Floats
+) -> tuple[SlicePair, Booleans]:
+    """Return the same of points (3, n), their r and phi (n,), and elevations (n,)."""
+    position, r, phi = place
+    kind = position.dtype.type
     share_of_turn = phi * kind(0.5 / np.pi)
-    if not printed:
+    if switches.geometry != "spherical-printed":
         share_of_turn = (kind(0.75) - share_of_turn) - kind(grid.turn)
         share_of_turn = share_of_turn - np.floor(share_of_turn)
     along = (r - kind(grid.start)) / kind(grid.span)
-    tilt = kind(np.pi / 2) - theta
     tilts = grid.tilts.astype(kind)
     first = np.clip(np.searchsorted(tilts, tilt, side="right") - 1, 0, max(len(tilts) - 2, 0))
     above = np.minimum(first + 1, len(tilts) - 1)
@@ -83,9 +91,9 @@ def sweep_pair(
     lower = first.astype(position.dtype)
     if switches.between == "x":
         share = share_of_turn * kind(len(tilts)) - lower
-    place = _column(switches, grid, share_of_turn), _row(switches, grid, along)
+    inside = _column(switches, grid, share_of_turn), _row(switches, grid, along)
     upper = lower + kind(1)
-    coordinates = in_atlas(switches, (lower, upper), place, (1, len(tilts)))
+    coordinates = in_atlas(switches, (lower, upper), inside, (1, len(tilts)))
     return SlicePair(lower, upper, share, *coordinates), seen
 
 

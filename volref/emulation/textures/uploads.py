@@ -61,6 +61,8 @@ def uploads_of(scene: Scene, pipeline: Pipeline) -> Uploads:
     assert scene.transfer is not None
     domain = domain_of(scene, pipeline)
     entries = baked_table(scene, pipeline, domain)
+    if pipeline.table.premultiplied:
+        entries[..., :3] *= entries[..., 3:]
     if pipeline.table.srgb:
         entries[..., :3] = encode_srgb(entries[..., :3])
     table = _table(entries, pipeline.table)
@@ -248,6 +250,8 @@ def table_place(table: TableTexture, values: Floats) -> Floats:
     >>> table_place(TableTexture(size=4, coordinate="centered"), np.array([0.0, 1.0])).tolist()
     [0.125, 0.875]
     """
+    if table.shift:
+        values = values + values.dtype.type(table.shift / table.size)
     if table.coordinate == "direct":
         return values
     kind = values.dtype.type

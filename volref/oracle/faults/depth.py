@@ -1,10 +1,7 @@
 """Faults of opaque meshes beside the volume: rows D of the table."""
 
-import dataclasses
-
 from volref.oracle.faults.fault import Subject
-from volref.oracle.faults.making import fault, switching
-from volref.scene.mesh import Mesh
+from volref.oracle.faults.making import fault, switched, switching
 
 
 def _by_depth(subject: Subject) -> bool:
@@ -15,33 +12,39 @@ def _by_distance(subject: Subject) -> bool:
     return bool(subject.scene.meshes) and subject.pipeline.meshes.kind == "distance"
 
 
-def _seen(subject: Subject) -> bool:
-    return bool(subject.scene.meshes) and not subject.scene.camera.is_parallel
+def _known(subject: Subject) -> bool:
+    return bool(subject.scene.meshes) and subject.pipeline.meshes.kind != "none"
 
 
-def _at_scaled_depth(subject: Subject, scale: float) -> Subject:
-    """Return a subject whose meshes cover the same pixels at another distance: scaled about the eye."""
-    eye = subject.scene.camera.world_from_view[:3, 3]
-
-    def moved(mesh: Mesh) -> Mesh:
-        return dataclasses.replace(mesh, vertices=eye + scale * (mesh.vertices - eye))
-
-    scene = dataclasses.replace(subject.scene, meshes=tuple(map(moved, subject.scene.meshes)))
-    return dataclasses.replace(subject, scene=scene)
+def _window(subject: Subject, _: float) -> Subject:
+    by_depth = subject.pipeline.meshes.kind == "depth"
+    return switched(subject, meshes={"depth": "window"} if by_depth else {"measure": "window"})
 
 
 DEPTH = (
     fault(
         "D1-window-depth",
         "the meshes' depth is window depth, which is not linear along a ray",
+        _window,
+        where=_known,
+    ),
+    fault(
+        "D1-window-over-w",
+        "the meshes' depth is 1 - window z / clip w, as in seed 000",
         switching(meshes={"depth": "window-over-w"}),
         where=_by_depth,
     ),
     fault(
+        "D1-view-depth",
+        "the meshes' distance is measured along the view, not along the ray",
+        switching(meshes={"measure": "view"}),
+        where=_by_distance,
+    ),
+    fault(
         "D1-range",
         "the meshes' depth has another range than the rays'",
-        _at_scaled_depth,
-        where=_seen,
+        lambda subject, scale: switched(subject, meshes={"scale": scale}),
+        where=_known,
         strengths=(1.1, 0.9, 1.3, 0.75),
         fitted=True,
     ),

@@ -15,7 +15,19 @@ def _lit_by_texture(subject: Subject) -> bool:
 
 NORMALS = (
     fault(
+        "N1-sign",
+        "normals have the wrong sign",
+        replaced("lighting", "normals", {"outward": "inward", "inward": "outward"}),
+        where=_lit,
+    ),
+    fault(
         "N1-space",
+        "normals are those of texture space, lights those of the world",
+        switching(lighting={"normals": "untransformed"}),
+        where=_lit,
+    ),
+    fault(
+        "N1-texture-space",
         "normals and lights are in texture space",
         switching(lighting={"space": "texture"}),
         where=lambda subject: _lit(subject) and subject.pipeline.lighting.model == "cej",
@@ -24,6 +36,12 @@ NORMALS = (
         "N1-kernel",
         "the gradient's kernel has a misprint",
         replaced("lighting", "gradient", {"sobel-bytes": "sobel-bytes-printed", "central": "forward"}),
+        where=_lit,
+    ),
+    fault(
+        "N1-unguarded",
+        "a gradient of 0 is divided by its length",
+        switching(lighting={"normals": "unguarded"}),
         where=_lit,
     ),
     fault(

@@ -17,6 +17,22 @@ def _stale(subject: Subject, ratio: float) -> Subject:
     return switched(subject, opacity={"factor": ratio * factor})
 
 
+def _at_each_sample(subject: Subject, factor: float) -> Subject:
+    return switched(subject, opacity={"times": factor})
+
+
+def _by_ray(subject: Subject, _: float) -> Subject:
+    """Return a subject whose opacity hangs on the length of the ray."""
+    rule, counted = subject.pipeline.opacity.rule, subject.pipeline.stepping.rule == "count"
+    if rule == "corrected":
+        return switched(subject, opacity={"rule": "corrected-by-ray"})
+    return switched(subject, opacity={"rule": "per-step"}) if rule == "per-length" and counted else subject
+
+
+def _gathered(subject: Subject, rule: str) -> Subject:
+    return switched(subject, accumulation={"rule": rule}, opacity={"rule": "as-is", "factor": 1.0})
+
+
 OPACITY = (
     fault(
         "O1-uncorrected",
@@ -26,7 +42,7 @@ OPACITY = (
     ),
     fault(
         "O1-stale",
-        "opacity is corrected for a step of another length",
+        "opacity is corrected for a step of another length, or in a world of another scale",
         _stale,
         where=_knows_the_step,
         strengths=(0.5, 2.0),
@@ -38,8 +54,36 @@ OPACITY = (
         replaced("accumulation", "rule", {"over": "add-alpha"}),
     ),
     fault(
+        "O3-factor-per-sample",
+        "a factor of the whole image is applied to each sample",
+        _at_each_sample,
+        strengths=(0.5, 0.8, 1.25),
+        fitted=True,
+    ),
+    fault("O4-ray-length", "opacity hangs on how long the ray is", _by_ray),
+    fault(
+        "O5-premultiplied-twice",
+        "the table's colours are multiplied by their opacity before they are uploaded and after",
+        switching(table={"premultiplied": True}),
+    ),
+    fault(
         "O5-straight-as-premultiplied",
-        "straight colour is taken for premultiplied",
+        "straight colours of samples are taken for premultiplied",
+        switching(accumulation={"color": "premultiplied"}),
+    ),
+    fault(
+        "O5-straight-output",
+        "the colour that is written is straight where premultiplied is meant",
         replaced("accumulation", "normalize", {"none": "always", "above-one": "always"}),
+    ),
+    fault(
+        "M1-average",
+        "the mean of the samples is shown in place of their composition",
+        lambda subject, _: _gathered(subject, "mean"),
+    ),
+    fault(
+        "M1-maximum",
+        "the most opaque sample is shown in place of the composition",
+        lambda subject, _: _gathered(subject, "greatest"),
     ),
 )

@@ -83,12 +83,18 @@ def _other_step(subject: Subject, ratio: float) -> Subject:
     return switched(changed, opacity={"factor": factor / ratio if follows else factor})
 
 
-def _biased(subject: Subject, by: float) -> Subject:
+def _biased(subject: Subject, mean: float) -> Subject:
+    """Return a subject whose samples lie at another mean place in their steps."""
     if subject.jitter is not None:
-        return dataclasses.replace(subject, jitter=np.clip(subject.jitter + by, 0.0, 1.0))
-    offset = subject.pipeline.stepping.offset
-    moved = min(max(offset + by, 0.0), 1.0)
-    return subject if moved == offset else switched(subject, stepping={"offset": moved})
+        return dataclasses.replace(subject, jitter=np.clip(2 * mean * subject.jitter, 0.0, 1.0))
+    if subject.pipeline.stepping.jitter or subject.pipeline.stepping.offset == mean:
+        return subject
+    return switched(subject, stepping={"offset": mean})
+
+
+def _filled(subject: Subject, threshold: float) -> Subject:
+    """Return a subject whose rays are opaque once they are at a threshold."""
+    return switched(_early(subject, threshold), stepping={"stopped": "opaque"})
 
 
 def _in_step(subject: Subject, _: float) -> Subject:
@@ -109,6 +115,23 @@ STEPPING = (
         switching(stepping={"opaque_at": None}),
     ),
     fault(
+        "T1-not-renormalised",
+        "rays that are ended early count as opaque without the colour that they lack",
+        _filled,
+        strengths=(0.95, 0.9, 0.8),
+        fitted=True,
+    ),
+    fault(
+        "T1-above-one",
+        "colour is not divided by an alpha above 1",
+        replaced("accumulation", "normalize", {"above-one": "none"}),
+    ),
+    fault(
+        "T2-first-step-dropped",
+        "the first step of each ray is left out",
+        lambda subject, _: switched(subject, stepping={"skipped": subject.pipeline.stepping.skipped + 1}),
+    ),
+    fault(
         "T2-last-step-dropped",
         "the last step of each ray is left out",
         _without_last,
@@ -118,6 +141,12 @@ STEPPING = (
         "T2-last-step-whole",
         "the rest of a ray counts as a whole step",
         replaced("stepping", "last_step", {"partial": "whole"}),
+        where=_ends_with_a_part,
+    ),
+    fault(
+        "T2-last-step-doubled",
+        "the last step of each ray is counted twice",
+        replaced("stepping", "last_step", {"partial": "doubled"}),
         where=_ends_with_a_part,
     ),
     fault(
@@ -144,7 +173,7 @@ STEPPING = (
         "J1-biased-jitter",
         "samples lie at another place in their steps",
         _biased,
-        strengths=(0.5, -0.5, 0.25, -0.25),
+        strengths=(0.0, 0.25, 0.5, 0.75, 1.0),
         fitted=True,
     ),
     fault("J1-wood-grain", "all rays start in step, without their jitter", _in_step),

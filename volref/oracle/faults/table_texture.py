@@ -55,7 +55,14 @@ def _coarse(subject: Subject, bits: float) -> Subject:
 TABLE = (
     fault(
         "L1-half-texel",
-        "the table is looked up half a texel off",
+        "the table is read beside its entries",
+        lambda subject, entries: switched(subject, table={"shift": entries}),
+        strengths=(0.5, -0.5),
+        fitted=True,
+    ),
+    fault(
+        "L1-ends-for-centers",
+        "the table's ends are taken for the centres of its outer entries, or the other way",
         replaced("table", "coordinate", {"direct": "centered", "centered": "direct"}),
     ),
     fault(
