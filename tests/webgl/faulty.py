@@ -19,7 +19,7 @@ from volref.golden.charts import Chart
 
 # What the papers' own misprints are called in the shaders.
 OWN = {
-    "D1-window-depth": "WINDOW_OVER_W",
+    "D1-window-over-w": "WINDOW_OVER_W",
     "D1-packing": "PACKING_PRINTED",
     "D2-squared-alpha": "OBJECT_PRINTED",
     "D2-one-step-early": "ONE_STEP_EARLY",

@@ -87,18 +87,14 @@ def _hole_as(job: Job, scene: Scene, share: float) -> Job:
     return change(job, scene, share)
 
 
-def _biased(job: Job, _: Scene, by: float) -> Job:
-    """Samples lie further on in their steps, all of them or the mean of them."""
+def _biased(job: Job, _: Scene, mean: float) -> Job:
+    """Samples lie at another place in their steps, all of them or the mean of them."""
 
     def change(one: Pass) -> Pass:
-        if "offset" not in one.uniforms:
-            return one
-        return replace(one, uniforms={**one.uniforms, "offset": one.uniforms["offset"] + by})
+        return replace(one, uniforms={**one.uniforms, "offset": mean}) if "offset" in one.uniforms else one
 
     moved = with_textures(
-        job,
-        ("jitter",),
-        lambda one: replace(one, values=np.clip(np.asarray(one.values) + np.float32(by), 0, 1)),
+        job, ("jitter",), lambda one: replace(one, values=one.values * np.float32(2 * mean))
     )
     return with_passes(moved, change)
 
@@ -160,6 +156,11 @@ def _premultiplied(values: np.ndarray, _: float) -> np.ndarray:
     return np.concatenate([colors, opacities], axis=-1)
 
 
+def _squared(values: np.ndarray, _: float) -> np.ndarray:
+    """Values that are in colour and alpha of an image, premultiplied."""
+    return np.rint(values * (values / 255)).astype(np.uint8)
+
+
 def _short(table: np.ndarray, entries: float) -> np.ndarray:
     """Of a table (rows, n, 4), so many entries, read where their centres are."""
     n = table.shape[1]
@@ -196,9 +197,9 @@ PAGE: Mapping[str, Page] = {
     "G4-flip-y": with_values(VOLUMES, lambda values, _: np.flip(values, 1)),
     "G4-flip-z": with_values(VOLUMES, lambda values, _: np.flip(values, 0)),
     "G4-swapped-axes": with_values(VOLUMES, lambda values, _: np.swapaxes(values, 1, 2)),
-    "G2-node-centred": _narrower,
+    "G2-node-box": _narrower,
     "G5-transform-ignored": _unturned,
-    "O5-premultiplied-table": with_values(TABLES, _premultiplied),
+    "O5-premultiplied-twice": with_values(TABLES, _premultiplied),
     "T1-early-stop": _stop_at,
     "T1-never-reached": lambda job, scene, _: _stop_at(job, scene, 2.0),
     "J1-biased-jitter": _biased,
@@ -210,6 +211,7 @@ PAGE: Mapping[str, Page] = {
     "F2-half-float": _uploaded_as("r16f"),
     "F2-eight-bit": _uploaded_as("r8"),
     "F3-srgb-upload": _as_srgb,
+    "F3-premultiplied-upload": with_values(VOLUMES, _squared),
     "F4-no-data": _hole_as,
     "B1-blended-twice": _blended_twice,
 }

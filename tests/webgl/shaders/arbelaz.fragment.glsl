@@ -8,7 +8,7 @@
 // STEPS and OPAQUE_AT are defined by the page.
 //
 // Faults, each by a definition of its strength; the paper's own are those above:
-// FAULT_D1_WINDOW_Z      the depth of window coordinates takes the place of one that is linear along the view
+// FAULT_D1_WINDOW_DEPTH  the depth of window coordinates takes the place of one that is linear along the view
 // FAULT_D1_RANGE         surfaces lie at so many times their depth: another far plane
 varying highp vec4 clip;
 varying highp vec3 front;

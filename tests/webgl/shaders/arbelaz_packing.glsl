@@ -30,7 +30,7 @@ float unpack_float(vec4 value) {
 #endif
 }
 
-// What is stored: 1 - depth (FAULT_D1_WINDOW_Z: of the window), so that a target cleared to 0 is as deep as can be.
+// What is stored: 1 - depth (FAULT_D1_WINDOW_DEPTH: of the window), so that a target cleared to 0 is as deep as can be.
 #ifdef WINDOW_OVER_W
 float nearness() {
   return gl_FragCoord.z * gl_FragCoord.w;
@@ -39,7 +39,7 @@ float nearness() {
 varying highp float ahead;  // distance along the view
 uniform vec2 planes;        // near and far
 float nearness() {
-#ifdef FAULT_D1_WINDOW_Z
+#ifdef FAULT_D1_WINDOW_DEPTH
   return 1.0 - gl_FragCoord.z;
 #endif
   return (planes.y - ahead) / (planes.y - planes.x);

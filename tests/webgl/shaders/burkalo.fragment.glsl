@@ -10,6 +10,7 @@
 // FAULT_C1_SRGB_NEVER        gamma is not applied
 // FAULT_C1_WRONG_SPACE       the background joins after gamma
 // FAULT_O2_ADD_ALPHA         alpha is added without what is in front
+// FAULT_T1_NOT_RENORMALISED  a ray ends at this alpha and counts as opaque
 // FAULT_B1_BLENDED_TWICE     colours are multiplied by alpha once more
 precision highp float;
 precision highp sampler2D;
@@ -97,6 +98,9 @@ vec4 marched(vec3 from, vec3 to) {
     while (left > 0.0 && !is_opaque(color.a)) {
         float value = texture(volume, at).r;
         color = with_sample(color, classified(value));
+#ifdef FAULT_T1_NOT_RENORMALISED
+        if (color.a > FAULT_T1_NOT_RENORMALISED) color.a = 1.0;
+#endif
         left -= step_length;
         at += step_vector;
     }

@@ -10,8 +10,9 @@
 //
 // Faults, each by a definition of its strength; the published code's own are ZERO_HALF and SKIP_FLAT:
 // FAULT_N1_SIGN              normals look into the surface
-// FAULT_N1_SPACE             normals and lights stay in texture space and in the world
-// FAULT_T1_NOT_RENORMALISED  what has more than alpha 1 stays as it is
+// FAULT_N1_SPACE             normals stay those of texture space, lights in the world
+// FAULT_N1_UNGUARDED         gradients of 0 are divided by their length
+// FAULT_T1_ABOVE_ONE         what has more than alpha 1 stays as it is
 precision highp float;
 precision highp int;
 precision highp sampler2D;
@@ -70,7 +71,7 @@ float answer(vec3 normal, vec3 towards, vec3 along, bool flat_) {
 vec3 illumination(vec3 place, vec3 gradient, vec3 along) {
     vec3 point = (lit_from_texture * vec4(place, 1.0)).xyz;
     bool flat_ = false;
-#ifndef SKIP_FLAT
+#if !defined(SKIP_FLAT) && !defined(FAULT_N1_UNGUARDED)
     flat_ = length(gradient) < 0.001;
 #endif
     vec3 normal = normalize(normal_from_gradient * gradient);
@@ -145,7 +146,7 @@ void main() {
         t += step_size;
     }
     if (sum.a > 1.0) {
-#ifndef FAULT_T1_NOT_RENORMALISED
+#ifndef FAULT_T1_ABOVE_ONE
         sum.rgb /= sum.a;
 #endif
     } else if (sum.a < 1.0) {

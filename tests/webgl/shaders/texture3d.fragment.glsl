@@ -5,7 +5,7 @@
 //
 // Faults, each by a definition of its strength:
 // FAULT_G1_HALF_VOXEL             the volume is read so many voxels further along all axes
-// FAULT_G2_NODES_ON_FACES         the outer voxels lie on the faces
+// FAULT_G2_NODE_CENTRED           the outer voxels lie on the faces
 // FAULT_G3_STEP_IN_TEXTURE_SPACE  lengths along the ray are those of texture space times the longest side
 // FAULT_G5_VANISHES_INSIDE        nothing is drawn with the eye in the box
 // FAULT_G6_BRICK_SEAMS            bricks of so many voxels know nothing of their neighbours
@@ -13,19 +13,20 @@
 // FAULT_O1_STALE                  opacity is for a step so many times as long
 // FAULT_O2_ADD_ALPHA              alpha is added without what is in front
 // FAULT_O3_FACTOR_PER_SAMPLE      opacity times this at each sample
-// FAULT_O4_WORLD_SCALE            opacity is for a scene so many times as large
-// FAULT_O5_STRAIGHT_AS_PREMULTIPLIED  alpha is divided out before the canvas blends
-// FAULT_O5_TWICE_PER_SAMPLE       the table's colours are multiplied by its opacity, then by that of the step
+// FAULT_O4_RAY_LENGTH             opacity is for rays that are all as long as the box's mean side
+// FAULT_O5_STRAIGHT_OUTPUT        alpha is divided out before the canvas blends
+// FAULT_O5_STRAIGHT_AS_PREMULTIPLIED  colours of the table are added as if multiplied by their opacity
+// FAULT_T1_NOT_RENORMALISED       a ray ends at this alpha and counts as opaque
 // FAULT_T2_...                    the first step, the last step: see the loop
 // FAULT_T3_LOOP_CAP               the loop ends after this share of the steps across the box
 // FAULT_T3_ONE_SIDED_EXIT         faces at 0 do not end a ray
 // FAULT_T4_STEP                   steps are so many times as long, their opacity is not
-// FAULT_L1_HALF_TEXEL             the table is read as if its outer entries were at 0 and 1
+// FAULT_L1_HALF_TEXEL             the table is read so many entries further
+// FAULT_L1_ENDS_FOR_CENTERS       the table is read as if its outer entries were for 0 and 1
 // FAULT_C1_SRGB_TWICE             colours are encoded once more
 // FAULT_C1_SRGB_NEVER             colours are decoded, and not encoded again
 // FAULT_L3_PRE_CLASSIFIED         the volume holds colours and opacities
 // FAULT_M1_AVERAGE                samples are averaged
-// FAULT_O5_PREMULTIPLIED_TWICE    colours are multiplied by alpha once more
 precision highp float;
 precision highp sampler2D;
 precision highp sampler3D;
@@ -53,7 +54,7 @@ vec3 read_at(vec3 place) {
 #ifdef FAULT_G1_HALF_VOXEL
   place += FAULT_G1_HALF_VOXEL / size;
 #endif
-#ifdef FAULT_G2_NODES_ON_FACES
+#ifdef FAULT_G2_NODE_CENTRED
   place = (place * (size - 1.0) + 0.5) / size;
 #endif
 #ifdef FAULT_G6_BRICK_SEAMS
@@ -70,22 +71,30 @@ vec4 classified(vec3 place) {
   return texture(volume, read_at(place));
 #else
   float value = texture(volume, read_at(place)).r;
-#ifdef FAULT_L1_HALF_TEXEL
   float entries = float(textureSize(table, 0).x);
+#ifdef FAULT_L1_HALF_TEXEL
+  value += FAULT_L1_HALF_TEXEL / entries;
+#endif
+#ifdef FAULT_L1_ENDS_FOR_CENTERS
   value = (value * (entries - 1.0) + 0.5) / entries;
 #endif
   return texture(table, vec2(value, 0.5));
 #endif
 }
 
+vec3 sides_of_box() {
+  return vec3(length(world_from_texture[0]), length(world_from_texture[1]), length(world_from_texture[2]));
+}
+
 // Opacity of a share of a step.
-float opacity_of(float alpha, float share) {
+float opacity_of(float alpha, float share, float ray_length) {
   float lengths = share * step_length / unit_distance;
 #ifdef FAULT_O1_STALE
   lengths *= FAULT_O1_STALE;
 #endif
-#ifdef FAULT_O4_WORLD_SCALE
-  lengths *= FAULT_O4_WORLD_SCALE;
+#ifdef FAULT_O4_RAY_LENGTH
+  vec3 sides = sides_of_box();
+  lengths *= (sides.x + sides.y + sides.z) / 3.0 / ray_length;
 #endif
   float opacity = 1.0 - pow(1.0 - alpha, lengths);
 #ifdef FAULT_O1_UNCORRECTED
@@ -100,7 +109,7 @@ float opacity_of(float alpha, float share) {
 // Length of a ray from face to face.
 float length_of(vec3 ray) {
 #ifdef FAULT_G3_STEP_IN_TEXTURE_SPACE
-  vec3 sides = vec3(length(world_from_texture[0]), length(world_from_texture[1]), length(world_from_texture[2]));
+  vec3 sides = sides_of_box();
   return length(ray) * max(sides.x, max(sides.y, sides.z));
 #else
   return length(world_from_texture * ray);
@@ -177,12 +186,13 @@ void main() {
       if (ray_length - begin <= walked) share *= 2.0;
 #endif
       vec4 found = classified(place);
-      float opacity = opacity_of(found.a, share);
+      float opacity = opacity_of(found.a, share, ray_length);
       float weight = (1.0 - alpha) * opacity;
-#ifdef FAULT_O5_TWICE_PER_SAMPLE
-      found.rgb *= found.a;
-#endif
+#ifdef FAULT_O5_STRAIGHT_AS_PREMULTIPLIED
+      color += found.rgb * (1.0 - alpha);
+#else
       color += found.rgb * weight;
+#endif
 #ifdef FAULT_O2_ADD_ALPHA
       alpha += opacity;
 #else
@@ -192,6 +202,9 @@ void main() {
       sum += vec4(found.rgb, 1.0) * found.a;
       samples += 1.0;
 #else
+#ifdef FAULT_T1_NOT_RENORMALISED
+      if (alpha >= FAULT_T1_NOT_RENORMALISED) alpha = 1.0;
+#endif
       if (alpha >= opaque_at) break;
 #endif
     }
@@ -202,11 +215,8 @@ void main() {
   }
   color += (1.0 - alpha) * object.rgb;
   alpha = object.a > 0.0 ? 1.0 : alpha;
-#ifdef FAULT_O5_STRAIGHT_AS_PREMULTIPLIED
-  color /= max(alpha, 1e-6);
-#endif
-#ifdef FAULT_O5_PREMULTIPLIED_TWICE
-  color *= alpha;
+#ifdef FAULT_O5_STRAIGHT_OUTPUT
+  if (alpha > 0.0) color /= alpha;
 #endif
 #ifdef FAULT_C1_SRGB_TWICE
   color = mix(12.92 * color, 1.055 * pow(color, vec3(1.0 / 2.4)) - 0.055, step(0.0031308, color));
