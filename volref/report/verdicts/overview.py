@@ -53,6 +53,6 @@ def _line(case: Case, number: int) -> str:
     return (
         f'<li data-kind="{case.kind}" data-name="{escape(case.name.lower())}">'
         f'<a href="#case-{number}">{picture}'
-        f'{badge(case)}<span class="title">{escape(case.name)}</span>'
+        f'<span class="badges">{badge(case)}</span><span class="title">{escape(case.name)}</span>'
         f'<span class="brief">{escape(outside_words(case))}</span>{cause}</a></li>'
     )

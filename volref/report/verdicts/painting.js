@@ -48,15 +48,20 @@ function differenceColor(numbers, i, settings) {
 }
 
 function intervalColor(numbers, i, settings) {
-  let below = false, above = false;
+  let below = false, above = false, furthest = 0;
   const outside = numbers.marks[i] & OUTSIDE;
   for (const c of outside ? channelsOf(settings) : []) {
     const excess = excessAt(numbers, c * numbers.count + i);
     below ||= !(excess >= 0);
     above ||= !(excess <= 0);
+    furthest = Math.max(furthest, Number.isNaN(excess) ? Infinity : Math.abs(excess));
   }
-  if (outside && settings.channel === "all" && !below && !above) return PALETTE.both;
-  if (below || above) return below && above ? PALETTE.both : below ? PALETTE.below : PALETTE.above;
+  // Rounding on the way may put outside what is inside on the canvas.
+  if (outside && settings.channel === "all" && !below && !above) below = above = true;
+  const part = Math.log1p(Math.min(furthest, PALETTE.fullExcess)) / Math.log1p(PALETTE.fullExcess);
+  const shade = PALETTE.leastShade + (1 - PALETTE.leastShade) * part;
+  const color = below && above ? PALETTE.both : below ? PALETTE.below : PALETTE.above;
+  if (below || above) return color.map((level) => Math.round(shade * level));
   const levels = [0, 1, 2].map((c) => levelOf(numbers, numbers.fields.candidate[c * numbers.count + i]) || 0);
   const grey = levels.reduce((sum, level) => sum + Math.min(Math.max(level, 0), 255), 0) / 3;
   return Array(3).fill(grey * PALETTE.insideShare);

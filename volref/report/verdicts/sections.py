@@ -35,9 +35,11 @@ def case_section(case: Case, number: int, sample: Sample) -> str:
         stills(case, sample),
         _titled("Why", _explanation(case, case.explanation, sample)) if case.explanation is not None else "",
         _titled("Pass by pass", _passes(case)) if case.passes else "",
-        _titled("Metrics", facts(metric_rows(case.verdict.metrics) + width_rows(case), "Metrics")),
-        _titled("What makes the interval wide", _causes(case)) if cause_rows(case) else "",
+        '<div class="columns">',
+        _titled("Metrics", facts(metric_rows(case.verdict.metrics), "Metrics")),
+        _titled("The interval", facts(width_rows(case), "The interval") + _causes(case)),
         _titled("Provenance", facts(provenance_rows(case), "Provenance")),
+        "</div>",
     ]
     return (
         f'<details class="case {kind}" id="case-{number}" data-kind="{kind}"'
@@ -56,7 +58,7 @@ def badge(case: Case) -> str:
 
 
 def _titled(title: str, content: str) -> str:
-    return f"<h4>{escape(title)}</h4>{content}"
+    return f"<div><h4>{escape(title)}</h4>{content}</div>"
 
 
 def _explanation(case: Case, explained: Explained, sample: Sample) -> str:
@@ -73,10 +75,13 @@ def _counterfactual(case: Case, image: Floats, sample: Sample) -> str:
     candidate, drawn = sample(case.candidate), sample(image)
     left = difference_of(candidate, drawn)
     scale = scale_of(left)
+    rest = (
+        f"candidate less counterfactual, black is 0, the ends are ±{scale}/255" if left.any() else "nothing"
+    )
     pictures: list[tuple[str, Bytes, str]] = [
         ("Candidate", shown(candidate), "what was judged"),
         ("Counterfactual", shown(drawn), "what the program draws with the first fault below"),
-        ("What is left", difference_picture(left, scale), f"candidate less counterfactual, ±{scale}/255"),
+        ("What is left", difference_picture(left, scale), rest),
     ]
     return f'<div class="trio">{"".join(_figure(case, *picture) for picture in pictures)}</div>'
 
@@ -104,6 +109,8 @@ def title_of(key: str) -> str:
 
 def _causes(case: Case) -> str:
     rows = cause_rows(case)
+    if not rows:
+        return ""
     widest = max(mean for _, mean, _ in rows)
     body = "".join(
         f'<tr><th scope="row">{escape(name)}</th><td>{_bar(mean, widest)} {mean:.3g}</td>'

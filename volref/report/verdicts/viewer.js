@@ -1,6 +1,7 @@
 // One case's viewer: settings, stage, readout.
 
 const FLICKER_MILLISECONDS = 500;
+const GLASS = 11;
 const STEPS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
 const NAMES = ["red", "green", "blue", "alpha"];
 
@@ -8,12 +9,13 @@ const calm = () => matchMedia("(prefers-reduced-motion: reduce)").matches;
 
 function shownNumber(level, parts) {
   if (!Number.isFinite(level)) return Number.isNaN(level) ? "NaN" : level < 0 ? "-inf" : "inf";
-  return parts === 1 ? String(level) : level.toFixed(2);
+  return parts === 1 ? String(level) : String(+level.toFixed(2));
 }
 
 function excessWords(excess, parts) {
-  if (Number.isNaN(excess)) return "no number";
-  return excess ? `${shownNumber(Math.abs(excess), parts)} ${excess < 0 ? "below" : "above"}` : "inside";
+  if (Number.isNaN(excess)) return "NaN";
+  if (excess === 0) return "inside";
+  return `${excess < 0 ? "−" : "+"}${shownNumber(Math.abs(excess), parts)}`;
 }
 
 class Viewer {
@@ -116,6 +118,7 @@ class Viewer {
     this.enable();
     this.ramp();
     this.fit();
+    this.magnify();
   }
 
   picture(pane, name, title) {
@@ -157,10 +160,11 @@ class Viewer {
   fit() {
     const seen = this.panes.filter((pane) => !pane.hidden);
     for (const pane of seen) {
-      const sheet = pane.querySelector(".sheet"), most = Math.min(pane.clientWidth, 640);
-      const times = (most * devicePixelRatio) / this.numbers.width;
+      const sheet = pane.querySelector(".sheet"), { width, height } = this.numbers;
+      const most = Math.min(pane.clientWidth, 640, (0.62 * innerHeight * width) / height);
+      const times = (most * devicePixelRatio) / width;
       const whole = times >= 1 ? Math.floor(times) : times;
-      sheet.style.width = `${(whole * this.numbers.width) / devicePixelRatio}px`;
+      sheet.style.width = `${(whole * width) / devicePixelRatio}px`;
     }
   }
 
@@ -217,13 +221,29 @@ class Viewer {
     if (mark & AMBIGUOUS) words.push("ambiguous");
     words.push(`width ${+widthAt(numbers, i).toPrecision(3)}/255`);
     this.find(".place").textContent = `x ${x}, y ${y}: ${words.join(", ")}`;
-    const columns = ["candidate", "lo", "nominal", "hi"].concat(numbers.fields.counterfactual ? ["counterfactual"] : []);
-    this.all(".readout tbody tr").forEach((line, c) => {
-      const cells = line.querySelectorAll("td"), at = c * numbers.count + i;
-      columns.forEach((name, k) => (cells[k].textContent = shownNumber(levelOf(numbers, numbers.fields[name][at]), numbers.parts)));
-      const excess = excessAt(numbers, at), last = cells[cells.length - 1];
-      last.textContent = c === 3 && this.root.dataset.alpha === "ignored" ? "not judged" : excessWords(excess, numbers.parts);
-      last.className = excess === 0 ? "in" : "out";
+    for (const line of this.all("tr[data-field]"))
+      line.querySelectorAll("td").forEach((cell, c) => {
+        const code = numbers.fields[line.dataset.field][c * numbers.count + i];
+        cell.textContent = shownNumber(levelOf(numbers, code), numbers.parts);
+      });
+    this.all(".beyond td").forEach((cell, c) => this.tellExcess(cell, c, excessAt(numbers, c * numbers.count + i)));
+    this.magnify();
+  }
+
+  tellExcess(cell, channel, excess) {
+    const ignored = channel === 3 && this.root.dataset.alpha === "ignored";
+    cell.textContent = ignored ? "not seen" : excessWords(excess, this.numbers.parts);
+    cell.className = excess === 0 ? "in" : "out";
+  }
+
+  /** The pixels around, of every image in view. */
+  magnify() {
+    this.all(".glass").forEach((glass, k) => {
+      const pane = this.panes[k], [x, y] = this.pixel, half = (GLASS - 1) / 2;
+      glass.hidden = pane.hidden;
+      glass.width = glass.height = GLASS;
+      const brush = glass.getContext("2d");
+      if (!pane.hidden) brush.drawImage(pane.querySelector("canvas"), x - half, y - half, GLASS, GLASS, 0, 0, GLASS, GLASS);
     });
   }
 }

@@ -5,7 +5,7 @@ What needs the page's script is hidden until it runs; without it there are four 
 
 from html import escape
 
-from volref.report.markup import inline_image, legend
+from volref.report.markup import inline_image, legend, scrolling
 from volref.report.pictures import LEVEL, error_map
 from volref.report.verdicts.cases import Case
 from volref.report.verdicts.pixels import Sample, packed
@@ -29,6 +29,7 @@ VIEWS = {
     "ambiguous": "Ambiguous",
 }
 CHANNELS = {"all": "All", "0": "Red", "1": "Green", "2": "Blue", "3": "Alpha"}
+CHANNELS_IN_FULL = ("red", "green", "blue", "alpha")
 SIGNS = {"signed": "Signed", "absolute": "Absolute"}
 BACKDROPS = {"black": "Black", "white": "White", "checks": "Checks"}
 
@@ -57,7 +58,7 @@ def stills(case: Case, sample: Sample) -> str:
             interval_picture(
                 candidate, sample(acceptance.lo), sample(acceptance.hi), sample(case.verdict.outside)
             ),
-            "blue: below the interval; orange: above; pink: both",
+            "blue: below the interval; orange: above; pink: both; the brighter the further out",
         ),
     ]
     figures = "".join(
@@ -83,10 +84,11 @@ def viewer(case: Case, number: int, sample: Sample) -> str:
 
 
 def _worst(case: Case, sample: Sample) -> str:
-    """Return the place, in what is shown, of the pixel that is most outside."""
+    """Return the place, in what is shown, of the pixel that is most outside; the middle if none is."""
     excess = sample(case.verdict.excess)
-    row, column = divmod(int(excess.argmax()), excess.shape[1])
-    return f"{column} {row}"
+    height, width = excess.shape
+    far = int(excess.argmax()) if excess.any() else height // 2 * width + width // 2
+    return f"{far % width} {far // width}"
 
 
 def _controls(case: Case, number: int) -> str:
@@ -155,6 +157,7 @@ def _below(case: Case, sample: Sample, number: int) -> str:
         '<p class="key"><span class="chip above"></span> above it</p>'
         '<p class="key"><span class="chip both"></span> below in one channel, above in another</p>'
         '<p class="key"><span class="chip inside"></span> inside, as a dark grey image</p>'
+        '<p class="key">The brighter, the further out: full at 31/255.</p>'
         f'<p class="key">{outside_words(case).capitalize()}.</p></div>'
         f'<div class="extra legend" data-view="width" data-top="{_top(case)}">{legend(widths)}'
         '<p class="key">How wide the interval of a pixel is before the canvas rounds, '
@@ -175,24 +178,24 @@ def _top(case: Case) -> str:
 
 
 def _readout(case: Case) -> str:
-    columns = [
-        "candidate",
-        "lowest",
-        "nominal",
-        "highest",
-        *(["counterfactual"] if case.counterfactual is not None else []),
-        "verdict",
-    ]
-    head = "".join(f'<th scope="col">{name}</th>' for name in ("1/255", *columns))
+    fields = {"candidate": "candidate", "lo": "lowest", "nominal": "nominal", "hi": "highest"}
+    lines = {f'data-field="{name}"': word for name, word in fields.items()}
+    lines['class="beyond"'] = "outside by"
+    if case.counterfactual is not None:
+        lines['data-field="counterfactual"'] = "with fault"
+    head = "".join(f'<th scope="col">{name}</th>' for name in ("1/255", *CHANNELS_IN_FULL))
     rows = "".join(
-        f'<tr><th scope="row">{name}</th>{"<td></td>" * len(columns)}</tr>'
-        for name in ("red", "green", "blue", "alpha")
+        f'<tr {mark}><th scope="row">{word}</th>{"<td></td>" * len(CHANNELS_IN_FULL)}</tr>'
+        for mark, word in lines.items()
     )
+    table = f"<table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>"
+    none = "" if case.verdict.outside.any() else " disabled"
+    glasses = '<div class="sheet glass-frame"><canvas class="glass"></canvas></div>' * 2
     return (
         '<div class="readout"><p class="place" role="status"></p>'
-        f'<div class="scroll" role="region" aria-label="Numbers of the pixel" tabindex="0">'
-        f"<table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table></div>"
-        '<div class="moves"><button type="button" class="worst">Worst pixel</button>'
-        '<button type="button" class="next">Next outside</button></div>'
-        f'<p class="key">Point at a pixel, or focus the image: {escape(KEYS[0].lower() + KEYS[1:])}</p></div>'
+        f"{scrolling('Numbers of the pixel', table)}"
+        f'<div class="near"><div class="glasses" aria-hidden="true">{glasses}</div>'
+        f'<div class="moves"><button type="button" class="worst"{none}>Worst pixel</button>'
+        f'<button type="button" class="next"{none}>Next outside</button></div></div>'
+        f'<p class="key keys">Point at a pixel, or focus the image. {escape(KEYS)}</p></div>'
     )

@@ -16,8 +16,10 @@ from volref.report.pictures import LEVEL, NEUTRAL, VIRIDIS
 SIGNED = np.array([(150, 205, 255), (35, 105, 205), (16, 17, 20), (200, 95, 20), (255, 205, 120)])
 
 # Below, above, and both in different channels; what is inside shows the image in a grey darker than these.
+# A pixel just outside has LEAST_SHADE of the colour, one FULL_EXCESS / 255 outside all of it.
 BELOW, ABOVE, BOTH = (70, 155, 255), (255, 150, 40), (235, 95, 215)
 INSIDE_SHARE = 0.4
+LEAST_SHADE, FULL_EXCESS = 0.5, 31
 
 AMBIGUOUS, PLAIN, NOTHING = (250, 210, 60), (70, 74, 84), (16, 17, 20)
 
@@ -78,7 +80,7 @@ def interval_picture(candidate: Floats, lo: Floats, hi: Floats, outside: Boolean
     >>> grey[0, 1, 0], grey[0, 2, 0] = 0.3, np.nan
     >>> lo, hi = np.full((1, 3, 4), 0.4), np.full((1, 3, 4), 0.6)
     >>> interval_picture(grey, lo, hi, grey[..., 0] != 0.5).tolist()
-    [[[51, 51, 51], [70, 155, 255], [235, 95, 215]]]
+    [[[51, 51, 51], [68, 151, 248], [235, 95, 215]]]
     """
     # A NaN is not at least lo and not at most hi: both.  So is what only rounding on the way puts outside.
     below = outside & ~(candidate >= lo).all(axis=-1)
@@ -87,9 +89,19 @@ def interval_picture(candidate: Floats, lo: Floats, hi: Floats, outside: Boolean
     below, above = below | neither, above | neither
     grey = np.clip(np.nan_to_num(candidate[..., :3]), 0, 1).mean(axis=-1) * INSIDE_SHARE
     picture = np.repeat(bytes_from_unit(grey)[..., None], 3, axis=-1)
+    shade = _shade(candidate, lo, hi)
     for mask, color in ((below, BELOW), (above, ABOVE), (below & above, BOTH)):
-        picture[mask] = color
+        picture[mask] = np.rint(shade[mask][:, None] * color)
     return picture
+
+
+def _shade(candidate: Floats, lo: Floats, hi: Floats) -> Floats:
+    """Return how bright pixels (h, w) are painted that are outside: more by the logarithm of how far."""
+    with np.errstate(invalid="ignore"):
+        beyond = np.maximum(np.maximum(lo - candidate, candidate - hi), 0) / LEVEL
+    excess = np.nan_to_num(beyond.max(axis=-1), nan=np.inf, posinf=np.inf)
+    part = np.log1p(np.minimum(excess, FULL_EXCESS)) / np.log1p(FULL_EXCESS)
+    return np.asarray(LEAST_SHADE + (1 - LEAST_SHADE) * part)
 
 
 def chips() -> str:
@@ -112,6 +124,8 @@ def palette() -> str:
             "above": ABOVE,
             "both": BOTH,
             "insideShare": INSIDE_SHARE,
+            "leastShade": LEAST_SHADE,
+            "fullExcess": FULL_EXCESS,
             "ambiguous": AMBIGUOUS,
             "plain": PLAIN,
             "nothing": NOTHING,
