@@ -6,9 +6,22 @@ from volref.golden.charts.chart import Chart
 
 BASELINE = named("texture3d")
 SHORT = BASELINE.with_switches("texture3d-2-entries", table={"size": 2})
-FLOATS = BASELINE.with_switches("texture3d-floats", volume={"format": "float"}, table={"format": "float"})
-CONGOTE, ARBELAZ, PAGE = named("congote2012"), named("arbelaz2016"), named("barbagallo")
-BURKALO, CEJ = named("burkalo2022"), named("cej2020")
+FLOATS = BASELINE.with_switches(
+    "texture3d-floats", volume={"format": "float"}, table={"format": "float", "size": 2048}
+)
+
+# Fewer steps than in the catalogue: faults of a step are larger, and charts are drawn sooner.
+CONGOTE = named("congote2012").with_switches("congote2012-64-steps", stepping={"steps": 64})
+CLAMPED = CONGOTE.with_switches(
+    "congote2012-64-steps-clamped",
+    volume={"in_tile": "clamped", "slices": "centers", "second_slice": "clamped"},
+)
+ARBELAZ = named("arbelaz2016").with_switches("arbelaz2016-48-steps", stepping={"steps": 48})
+PAGE = named("barbagallo").with_switches(
+    "barbagallo-64-steps", stepping={"steps": 64}, opacity={"factor": 12.8}
+)
+BURKALO = named("burkalo2022")
+CEJ = named("cej2020").with_switches("cej2020-24-steps", stepping={"steps": 24})
 
 _ALL = (
     Chart(
@@ -17,6 +30,7 @@ _ALL = (
     Chart("f-atlas", "the F in an atlas of 4 x 3 tiles", places.f_atlas, CONGOTE, ("A1", "A2", "A3")),
     Chart("ramp-by-bright", "a ramp along z by bright slices", places.ramp_by_bright, CONGOTE, ("A2", "A3")),
     Chart("full-tiles", "an atlas whose tiles are full to their edges", places.full_tiles, CONGOTE, ("A3",)),
+    Chart("clamped-tiles", "the same, held half a texel inside", places.full_tiles, CLAMPED, ("A3",)),
     Chart("turned", "the F of long voxels, turned and moved", places.turned, BASELINE, ("G3", "G5")),
     Chart("checkers", "values that jump from voxel to voxel", places.checkers, BASELINE, ("F1", "L3", "M1")),
     Chart("no-data", "a hole without values in a slab", places.no_data, BASELINE, ("F4",)),
@@ -65,7 +79,7 @@ _ALL = (
         BURKALO,
         ("C1", "O1"),
     ),
-    Chart("lit-sphere", "a lit ball, a mean of 4 frames", surroundings.lit_sphere, CEJ, ("N1", "J1"), 4),
+    Chart("lit-sphere", "a lit ball, a mean of 2 frames", surroundings.lit_sphere, CEJ, ("N1", "J1"), 2),
     Chart("lit-turned", "the F, lit, of long voxels", surroundings.lit_turned, CEJ, ("N1", "J1"), 1),
 )
 

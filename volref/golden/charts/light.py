@@ -112,11 +112,11 @@ def spike() -> Scene:
 
 
 def fine_values() -> Scene:
-    """Return values that differ by less than 8 bits hold of them, through a table that is steep there."""
+    """Return values that lie closer than 8 or 16 bits tell, through a table that is steep there."""
     x, y, z = indices(12, 10, 8)
-    values = 0.7 + 0.008 * np.sin(0.5 * x + 0.3 * z) * np.cos(0.45 * y - 0.2 * z)
+    values = 0.7 + 0.002 * np.sin(0.5 * x + 0.3 * z) * np.cos(0.45 * y - 0.2 * z)
     look = TransferFunction.from_opacity(
-        [0, 0.69, 0.7, 0.71, 1], [BLUE, BLUE, YELLOW, RED, RED], [0, 0, 0.4, 0.8, 0.8], UNIT_DISTANCE
+        [0, 0.698, 0.7, 0.702, 1], [BLUE, BLUE, YELLOW, RED, RED], [0, 0, 0.4, 0.8, 0.8], UNIT_DISTANCE
     )
     volume = Volume(values.astype(np.float32))
     return pictured(volume, look, view(volume, (0.5, 0.6, 1.0)))

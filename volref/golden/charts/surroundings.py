@@ -107,7 +107,7 @@ def _lit(volume: Volume, direction: ArrayLike, material: Material) -> Scene:
 def lit_sphere() -> Scene:
     """Return a ball under a sun, a lamp and a sky."""
     return _lit(
-        _ball(), (0.5, 0.6, 1.0), Material("phong", ambient=0.4, diffuse=0.8, specular=0.4, shininess=8)
+        _ball(), (0.5, 0.6, 1.0), Material("phong", ambient=0.4, diffuse=0.8, specular=0.8, shininess=30)
     )
 
 
