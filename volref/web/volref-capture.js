@@ -87,7 +87,11 @@ export function captureCanvas(gl, options = {}) {
   if (attributes.antialias) {
     const got = "antialias: true, which blurs silhouettes by a rule of each GPU";
     if (!options.allowAntialias) {
-      refuse("the canvas must be drawn without antialiasing", got, "make the context with {antialias: false}");
+      refuse(
+        "the canvas must be drawn without antialiasing",
+        got,
+        "make the context with {antialias: false}",
+      );
     }
     notes.push(`the canvas was drawn with ${got}`);
   }

@@ -22,7 +22,7 @@ export function checkSize(width, height, asked) {
   refuse(`the canvas must be ${wanted[0]} x ${wanted[1]} pixels`, `${width} x ${height}`, cure);
 }
 
-/** Refuse an image of nothing but zeros, or opaque black: what the browser leaves of a canvas it has shown. */
+/** Refuse an image of nothing but zeros or opaque black: what the browser leaves of a canvas it has shown. */
 export function checkDrawn(data, preserved) {
   const alpha = data[3];
   const empty =
@@ -31,8 +31,8 @@ export function checkDrawn(data, preserved) {
   if (!empty) return;
   const cure = preserved
     ? "draw first, or pass {allowEmpty: true} if that is the image"
-    : "capture in the task that draws: pass {draw}, or make the context with {preserveDrawingBuffer: true}, " +
-      "or pass {allowEmpty: true} if that is the image";
+    : "capture in the task that draws: pass {draw}, or make the context with {preserveDrawingBuffer: true}" +
+      ", or pass {allowEmpty: true} if that is the image";
   refuse("the canvas must hold an image", alpha === 0 ? "nothing but zeros" : "nothing but black", cure);
 }
 
