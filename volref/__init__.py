@@ -24,6 +24,10 @@ if TYPE_CHECKING:
     from volref.emulation.pipeline import Pipeline
     from volref.emulation.result import Emulation
     from volref.errors import FormatError, SceneError
+    from volref.golden.bundle import Bundle
+    from volref.golden.checking import check_bundle
+    from volref.golden.reading import load_bundle
+    from volref.golden.writing import write_bundle
     from volref.io import (
         AtlasLayout,
         convert_volume,
@@ -92,6 +96,7 @@ __version__ = "0.1.0"
 __all__ = [
     "Acceptance",
     "AtlasLayout",
+    "Bundle",
     "Camera",
     "Candidates",
     "Comparison",
@@ -122,6 +127,7 @@ __all__ = [
     "axis_slice",
     "cappi",
     "check",
+    "check_bundle",
     "clip_box",
     "compare",
     "convert_volume",
@@ -131,6 +137,7 @@ __all__ = [
     "emulate",
     "jitter_images",
     "load_acceptance",
+    "load_bundle",
     "load_camera",
     "load_candidates",
     "load_device",
@@ -168,6 +175,7 @@ __all__ = [
     "trace",
     "verify",
     "write_animation",
+    "write_bundle",
     "write_image",
 ]
 
@@ -181,6 +189,10 @@ _HOMES = {
     "volref.emulation.pipeline": ("Pipeline",),
     "volref.emulation.result": ("Emulation",),
     "volref.errors": ("FormatError", "SceneError"),
+    "volref.golden.bundle": ("Bundle",),
+    "volref.golden.checking": ("check_bundle",),
+    "volref.golden.reading": ("load_bundle",),
+    "volref.golden.writing": ("write_bundle",),
     "volref.oracle.acceptance": ("Acceptance",),
     "volref.oracle.acceptance_files": ("load_acceptance", "save_acceptance"),
     "volref.oracle.accepting": ("accept",),

@@ -16,6 +16,9 @@ from volref.errors import FormatError
 from volref.io.guard import DEFAULT_MAX_BYTES, Foreign, read_json
 from volref.io.npy import npz_headers, read_npy, read_npz
 
+# What an interval consists of.
+INTERVAL = ("lo", "hi", "raw_lo", "raw_hi", "ambiguous", "drawn")
+
 
 def digest_of_array(array: Numbers) -> str:
     """Return the digest of an array.
@@ -76,15 +79,15 @@ def digest_of_files(folder: Path, paths: list[str]) -> str:
     return digest_of_parts({p: digest_of_file(folder / p) for p in paths if not p.endswith(".png")})
 
 
-def digests_of(folder: Path, document: Foreign) -> dict[str, str]:
-    """Return the digests of the parts of a bundle: scene, inputs, nominal, passes, interval."""
-    paths = [entry["path"] for entry in document["files"]]
+def digests_of(folder: Path, document: Foreign) -> dict[str, str | None]:
+    """Return the digests of the parts of a bundle; of the interval None where there is none."""
     expected = document["expected"]
-    interval = [expected[key] for key in ("lo", "hi", "raw_lo", "raw_hi", "ambiguous", "drawn")]
+    ends = [expected[key] for key in INTERVAL if key in expected]
+    inputs = sorted(file.relative_to(folder).as_posix() for file in (folder / "inputs").iterdir())
     return {
-        "scene": digest_of_files(folder, [path for path in paths if "/" not in path]),
-        "inputs": digest_of_files(folder, [path for path in paths if path.startswith("inputs/")]),
+        "scene": digest_of_files(folder, sorted(file.name for file in folder.glob("scene.*"))),
+        "inputs": digest_of_files(folder, inputs),
         "nominal": digest_of_files(folder, [expected["nominal"]]),
         "passes": digest_of_files(folder, [entry["path"] for entry in document["passes"]]),
-        "interval": digest_of_files(folder, interval),
+        "interval": digest_of_files(folder, ends) if ends else None,
     }

@@ -14,6 +14,7 @@ from volref.errors import FormatError, SceneError
 from volref.golden.bundle import Bundle
 from volref.golden.contents import MANIFEST, check_listed, checked_files
 from volref.golden.manifest import named_paths, read_manifest
+from volref.golden.recipe import paths_in
 from volref.io.guard import DEFAULT_MAX_BYTES, Foreign, one_line, read_json
 from volref.io.npy import read_npy
 from volref.io.scenes import load_scene
@@ -117,7 +118,7 @@ def _built(place: Path, document: dict[str, Any], arrays: _Arrays) -> Bundle:
 
 def _scene(place: Path, document: dict[str, Any], arrays: _Arrays) -> Scene:
     """Return the scene, all of whose files are listed."""
-    check_listed(_paths_in(read_json(place / "scene.json")), arrays.files)
+    check_listed(paths_in(read_json(place / "scene.json")), arrays.files)
     scene = load_scene(place / "scene.json", max_bytes=arrays.max_bytes)
     image = document["image"]
     if (scene.width, scene.height) == (image["width"], image["height"]):
@@ -131,13 +132,3 @@ def _check_order(expected: Mapping[str, Any], images: Mapping[str, Numbers]) -> 
         if (images[low] > images[high]).any():
             message = f"{expected[low]} must not exceed {expected[high]}, got one that does; "
             raise FormatError(message + "make the bundle again")
-
-
-def _paths_in(document: Foreign) -> list[str]:
-    """Return every file that a scene names."""
-    if isinstance(document, list):
-        return [path for item in document for path in _paths_in(item)]
-    if not isinstance(document, dict):
-        return []
-    here = [value for key, value in document.items() if key == "path" and isinstance(value, str)]
-    return here + [path for value in document.values() for path in _paths_in(value)]

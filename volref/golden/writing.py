@@ -9,6 +9,7 @@ from typing import Any, TypedDict, Unpack
 import numpy as np
 from numpy.typing import ArrayLike
 
+from volref.arrays import Numbers
 from volref.emulation.catalogue import named
 from volref.emulation.device import FORMAT as DEVICE_FORMAT
 from volref.emulation.device import FORMAT_VERSION as DEVICE_FORMAT_VERSION
@@ -31,7 +32,6 @@ from volref.golden.manifest import (
     is_bundle,
     manifest_text,
 )
-from volref.image import encode_rgba8
 from volref.io.atomic import write_text
 from volref.io.folders import atomic_folder
 from volref.io.guard import one_line
@@ -100,7 +100,7 @@ def write_subject(folder: str | Path, subject: Subject, **options: Unpack[Option
     target = Path(folder)
     overwrite = options.get("overwrite", False)
     with atomic_folder(target, overwrite=overwrite, replaceable=is_bundle) as part:
-        parts = _write_parts(part, subject, options.get("truth"))
+        parts = write_parts(part, subject, truth=options.get("truth"))
         recipe = options.get("recipe")
         document = {
             "format": FORMAT,
@@ -139,25 +139,32 @@ def device_document(device: Device) -> dict[str, Any]:
     return {"format": DEVICE_FORMAT, "version": DEVICE_FORMAT_VERSION, **device.as_dict()}
 
 
-def _write_parts(part: Path, subject: Subject, truth: float | None) -> dict[str, Any]:
-    """Write all but the manifest; return what it says of them."""
+def write_parts(
+    part: Path, subject: Subject, *, truth: float | None = None, interval: bool = True
+) -> dict[str, Any]:
+    """Write all but the manifest; return what that says of it.  Without `interval` only what is drawn."""
     save_scene(_plain_scene(subject.scene), part / "scene.json")
     asked = subject.scene, subject.pipeline, subject.device, subject.jitter, subject.frames
-    drawn, accepted = emulate(*asked), accept(*asked)
-    return {
+    drawn = emulate(*asked)
+    document: dict[str, Any] = {
         "uploads": write_inputs(part, subject),
-        "passes": write_passes(part, drawn),
-        "expected": _write_expected(part, drawn, accepted) | _write_truth(part, subject.scene, truth),
-        "acceptance": {
+        "passes": _write_passes(part, drawn),
+        "expected": _write_drawn(part, drawn),
+    }
+    if interval:
+        accepted = accept(*asked)
+        document["expected"] |= _write_accepted(part, accepted)
+        document["acceptance"] = {
             "advice": accepted.advice,
             "width_p50": accepted.percentile(50),
             "width_p99": accepted.percentile(99),
             "share_ambiguous": accepted.share_ambiguous,
-        },
-    }
+        }
+    document["expected"] |= _write_truth(part, subject.scene, truth)
+    return document
 
 
-def write_passes(part: Path, drawn: Emulation) -> list[dict[str, str]]:
+def _write_passes(part: Path, drawn: Emulation) -> list[dict[str, str]]:
     """Write every target of an emulation to `passes/` of a folder; return the manifest's "passes"."""
     (part / "passes").mkdir()
     return [
@@ -166,36 +173,37 @@ def write_passes(part: Path, drawn: Emulation) -> list[dict[str, str]]:
     ]
 
 
-def _write_expected(part: Path, drawn: Emulation, accepted: Acceptance) -> dict[str, Any]:
+def _write_drawn(part: Path, drawn: Emulation) -> dict[str, Any]:
     (part / "expected").mkdir()
-    arrays = {key: getattr(accepted, key) for key in ("nominal", "lo", "hi", "raw_lo", "raw_hi")}
-    arrays |= {"ambiguous": accepted.ambiguous, "drawn": accepted.drawn}
+    arrays = {"nominal": drawn.rgba}
     if np.isfinite(drawn.distance).any():
         arrays["distance"] = drawn.distance
+    preview = "expected/preview.png"
+    write_png(part / preview, drawn.rgba8)
+    return _write_arrays(part, arrays) | {"preview": preview}
+
+
+def _write_accepted(part: Path, accepted: Acceptance) -> dict[str, Any]:
+    arrays: dict[str, Numbers] = {key: getattr(accepted, key) for key in ("lo", "hi", "raw_lo", "raw_hi")}
+    arrays |= {"ambiguous": accepted.ambiguous, "drawn": accepted.drawn}
     if accepted.low_quality is not None:
         coarse = accepted.low_quality()
         arrays |= {"low_quality_lo": coarse.lo, "low_quality_hi": coarse.hi}
-    written: dict[str, Any] = {
-        key: write_array(part, f"expected/{key}.npy", array) for key, array in arrays.items()
-    }
-    written["causes"] = {
-        name: write_array(part, f"expected/cause_{number}.npy", width)
-        for number, (name, width) in enumerate(accepted.causes.items())
-    }
-    written["preview"] = "expected/preview.png"
-    write_png(part / written["preview"], drawn.rgba8)
-    return written
+    causes = {f"cause_{number}": width for number, width in enumerate(accepted.causes.values())}
+    written = _write_arrays(part, causes)
+    named = {name: written[f"cause_{number}"] for number, name in enumerate(accepted.causes)}
+    return _write_arrays(part, arrays) | {"causes": named}
+
+
+def _write_arrays(part: Path, arrays: Mapping[str, Numbers]) -> dict[str, Any]:
+    return {key: write_array(part, f"expected/{key}.npy", array) for key, array in arrays.items()}
 
 
 def _write_truth(part: Path, scene: Scene, tolerance: float | None) -> dict[str, Any]:
     if tolerance is None:
         return {}
     out = render(scene, tolerance=tolerance)
-    written = {
-        key: write_array(part, f"expected/{key}.npy", array)
-        for key, array in (("truth", out.rgba), ("bound", out.bound))
-    }
-    write_png(part / "expected" / "truth.png", encode_rgba8(out.rgba))
+    written = _write_arrays(part, {"truth": out.rgba, "bound": out.bound})
     return written | {"bound_kind": out.bound_kind}
 
 
