@@ -45,7 +45,7 @@ OPACITY = (
         "opacity is corrected for a step of another length, or in a world of another scale",
         _stale,
         where=_knows_the_step,
-        strengths=(0.5, 2.0),
+        strengths=(0.25, 0.5, 2.0, 4.0),
         fitted=True,
     ),
     fault(

@@ -1,0 +1,1 @@
+"""The search for the fault that explains an image: what is drawn, measured, tried and said."""

@@ -1,0 +1,134 @@
+"""The search: all faults at their listed strengths, the best ones' strengths fitted, then pairs."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from volref.oracle.explaining.findings import Finding, Part, ranked
+from volref.oracle.explaining.trying import Trials, key_of
+from volref.oracle.faults.fault import Fault, Subject
+from volref.oracle.faults.making import strengths_for
+
+# What a single fault has to explain for no pair to be looked for.
+ENOUGH = 0.95
+
+# How many of the best faults have their strength fitted, and are kept for the whole image.
+FITTED, KEPT = 8, 8
+
+# How many of the best faults are tried together with every other one.
+LEADING = 3
+
+# Steps of a golden section, each of which leaves 0.62 of the span, and of Gauss and Newton after them.
+STEPS, NEWTON_STEPS, GOLDEN = 3, 4, (5**0.5 - 1) / 2
+
+
+def singles(trials: Trials, faults: list[Fault]) -> list[Finding]:
+    """Return what each fault explains, at the best of its strengths."""
+    plan = [Part(one, strength) for one in faults for strength in strengths_for(one, trials.subject)]
+    trials.expected = len(plan) + FITTED * (STEPS + NEWTON_STEPS) + KEPT
+    found = ranked([trials.tried(part) for part in plan])
+    better = [_refined(trials, one, 0) for one in found if one.parts[0].fault.fitted][:FITTED]
+    return ranked([*found, *better])
+
+
+def pairs_of(trials: Trials, faults: list[Fault], alone: list[Finding]) -> list[Finding]:
+    """Return what the best faults explain together with another one."""
+    leading = [one.parts[0] for one in alone[:LEADING]]
+    others = [one.parts[0] for one in alone]
+    plan = {
+        _in_order(faults, one, other): None
+        for one in leading
+        for other in others
+        if one.fault.key != other.fault.key
+    }
+    trials.expected = trials.count + len(plan) + 8 * (STEPS + NEWTON_STEPS)
+    found = ranked([trials.tried(*pair) for pair in plan])
+    better = []
+    for one in found[:2]:
+        for place in (0, 1, 0, 1):
+            one = _refined(trials, one, place)
+        better.append(one)
+    return ranked([*found[:KEPT], *better])
+
+
+def _in_order(faults: list[Fault], one: Part, other: Part) -> tuple[Part, Part]:
+    keys = [fault.key for fault in faults]
+    first, second = sorted((one, other), key=lambda part: keys.index(part.fault.key))
+    return first, second
+
+
+def _refined(trials: Trials, finding: Finding, place: int) -> Finding:
+    """Return a finding with the strength of one of its faults fitted: golden sections, then Gauss-Newton."""
+    part = finding.parts[place]
+    if not part.fault.fitted or finding.explained >= 1.0:
+        return finding
+
+    def at(strength: float) -> Finding:
+        parts = list(finding.parts)
+        parts[place] = Part(part.fault, strength)
+        return trials.tried(*parts)
+
+    low, high = _span(part, trials.subject)
+    seen = [finding, *_sections(at, low, high)]
+    for _ in range(NEWTON_STEPS):
+        seen.sort(key=lambda one: -one.explained)
+        strength = _newton(trials, seen, place)
+        if strength is None or not low <= strength <= high:
+            break
+        seen.append(at(strength))
+    return max(seen, key=lambda one: one.explained)
+
+
+def _sections(at: Callable[[float], Finding], low: float, high: float) -> list[Finding]:
+    """Return what is found where golden sections of a span lead to."""
+    inner = [high - GOLDEN * (high - low), low + GOLDEN * (high - low)]
+    seen: list[Finding] = []
+    for _ in range(STEPS):
+        one, other = (at(strength) for strength in inner)
+        seen += [one, other]
+        if one.explained >= other.explained:
+            high = inner[1]
+            inner = [high - GOLDEN * (high - low), inner[0]]
+        else:
+            low = inner[0]
+            inner = [inner[1], low + GOLDEN * (high - low)]
+    return seen
+
+
+def _newton(trials: Trials, seen: list[Finding], place: int) -> float | None:
+    """Return where the best strength lies if pictures change evenly from the best to the next best.
+
+    Differences count by their size, not its square: each is divided by it, and by a level at least.
+    """
+    best, strength = seen[0], seen[0].parts[place].strength
+    others = (one for one in seen[1:] if one.parts[place].strength != strength)
+    near = min(others, key=lambda one: abs(one.parts[place].strength - strength), default=None)
+    here = trials.looked_at[key_of(best.parts)]
+    there = None if near is None else trials.looked_at[key_of(near.parts)]
+    if near is None or here is None or there is None:
+        return None
+    slope = (there - here) / (near.parts[place].strength - strength)
+    left = trials.measure.image - here
+    weight = trials.measure.weight / (np.abs(left) + 1 / 255)
+    steepness = float(np.sum(weight * slope * slope))
+    if steepness == 0:
+        return None
+    moved = strength + float(np.sum(weight * slope * left)) / steepness
+    return None if moved == strength else moved
+
+
+def _span(part: Part, subject: Subject) -> tuple[float, float]:
+    """Return between which strengths the best one lies, if one of the listed ones is the best of those."""
+    listed = sorted({*strengths_for(part.fault, subject), part.strength})
+    at = listed.index(part.strength)
+    gaps = np.diff(listed)
+    usual = float(np.min(gaps)) if len(gaps) else 0.5 * abs(part.strength)
+    low = listed[at - 1] if at else _beyond(part.strength, -usual)
+    high = listed[at + 1] if at + 1 < len(listed) else _beyond(part.strength, usual)
+    return low, high
+
+
+def _beyond(strength: float, by: float) -> float:
+    """Return a strength farther out; not through 0, where a fault is another one: half as far."""
+    moved = strength + by
+    return moved if strength == 0 or strength * moved > 0 else strength / 2
