@@ -57,7 +57,9 @@ if TYPE_CHECKING:
     from volref.oracle.acceptance import Acceptance
     from volref.oracle.acceptance_files import load_acceptance, save_acceptance
     from volref.oracle.accepting import accept
+    from volref.oracle.faults.fault import Subject
     from volref.oracle.metrics import Comparison, compare
+    from volref.oracle.shrinking import shrink
     from volref.oracle.tracing import trace
     from volref.oracle.verdict import Verdict, check
     from volref.phantoms.transfer import dbz_transfer
@@ -115,6 +117,7 @@ __all__ = [
     "Scene",
     "SceneError",
     "Series",
+    "Subject",
     "Sweep",
     "Trace",
     "TransferFunction",
@@ -170,6 +173,7 @@ __all__ = [
     "save_transfer",
     "save_volume",
     "scene_schema",
+    "shrink",
     "supersample",
     "tone_map",
     "trace",
@@ -196,7 +200,9 @@ _HOMES = {
     "volref.oracle.acceptance": ("Acceptance",),
     "volref.oracle.acceptance_files": ("load_acceptance", "save_acceptance"),
     "volref.oracle.accepting": ("accept",),
+    "volref.oracle.faults.fault": ("Subject",),
     "volref.oracle.metrics": ("Comparison", "compare"),
+    "volref.oracle.shrinking": ("shrink",),
     "volref.oracle.tracing": ("trace",),
     "volref.oracle.verdict": ("Verdict", "check"),
     "volref.phantoms.transfer": ("dbz_transfer",),

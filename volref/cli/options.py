@@ -125,9 +125,9 @@ def byte_count(text: str) -> int:
     return int(digits) << 10 * (" KMGT".index(unit) if unit else 0)
 
 
-def add_scene(parser: argparse.ArgumentParser) -> None:
-    """Add SCENE and how to read it."""
-    parser.add_argument("scene", metavar="SCENE", help="a scene file (.json)")
+def add_scene(parser: argparse.ArgumentParser, about: str = "a scene file (.json)") -> None:
+    """Add SCENE, `about` being what it may be, and how to read it."""
+    parser.add_argument("scene", metavar="SCENE", help=about)
     parser.add_argument(
         "--size",
         type=image_size,

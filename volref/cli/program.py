@@ -13,7 +13,9 @@ from collections.abc import Sequence
 from typing import NoReturn
 
 from volref.cli import (
+    accept,
     charts,
+    check,
     compare,
     convert,
     demo,
@@ -39,6 +41,8 @@ VERBS = (
     trace.VERB,
     emulate.VERB,
     pipelines.VERB,
+    accept.VERB,
+    check.VERB,
     compare.VERB,
     charts.VERB,
     info.VERB,
