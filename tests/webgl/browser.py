@@ -81,7 +81,7 @@ def opened(name: str, address: str | None = None, flags: tuple[str, ...] = (), *
     NotRunError
         If Playwright, Chromium or the implementation is not there.
     """
-    executable = _chromium()
+    executable = chromium()
     with ThreadPoolExecutor(1, thread_name_prefix=name) as thread:
         closing = ExitStack()
         try:
@@ -91,7 +91,8 @@ def opened(name: str, address: str | None = None, flags: tuple[str, ...] = (), *
             thread.submit(closing.close).result(JOB_SECONDS)
 
 
-def _chromium() -> str:
+def chromium() -> str:
+    """Return the path of Chromium."""
     if find_spec("playwright") is None:
         message = "playwright is not installed; pip install 'volref[webgl]'"
         raise NotRunError(message)

@@ -9,6 +9,7 @@ import pytest
 from tests.webgl.browser import IMPLEMENTATIONS, NotRunError
 from tests.webgl.engine import engine
 from tests.webgl.modules import WEBGPU, modules
+from tests.webgl.reading import reader
 
 
 def pytest_collection_modifyitems(items):
@@ -63,6 +64,17 @@ def page(tmp_path_factory):
 def fine_page(tmp_path_factory):
     """A page with volref's ES modules, on Mesa's llvmpipe; 2 x 2 device pixels for a CSS pixel."""
     yield from _page("llvmpipe", tmp_path_factory, device_scale_factor=2)
+
+
+@pytest.fixture(scope="session")
+def visit():
+    """What opens a file as a reader does, see `reader`."""
+    with ExitStack() as closing:
+        try:
+            kept = closing.enter_context(reader())
+        except NotRunError as why:
+            kept = why
+        yield _had(kept)
 
 
 def _page(name, tmp_path_factory, flags=(), **settings):
