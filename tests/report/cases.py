@@ -1,24 +1,31 @@
 """Judged images of every kind, made up: a smooth canvas, its intervals, and what may be wrong with it."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from tests.oracle.made_up import acceptance_of
 from volref import Acceptance, Pipeline, check
 from volref.emulation.groups import Output
+from volref.oracle.explanation import Explanation, Ranked
 from volref.report.verdicts.cases import Case
 
 HOSTILE = "</title></script><script>window.hacked = 1</script><img src=x onerror=window.hacked=2> \"'&amp;"
 
 
-@dataclass(frozen=True, eq=False)
-class Why:
-    """What the page needs of an explanation."""
-
-    ranking: tuple
-    message: str
-    counterfactual: np.ndarray | None
+def why(ranking, message, counterfactual, verdict, status="explained"):
+    """An explanation with these parts."""
+    ranked = tuple(Ranked(*one) for one in ranking)
+    return Explanation(
+        status,
+        ranking=ranked,
+        identifiable=True,
+        runner_up="",
+        message=message,
+        counterfactual=counterfactual,
+        charts=(),
+        verdict=verdict,
+    )
 
 
 def canvas(height=20, width=24):
@@ -55,12 +62,18 @@ def failing(name="wrong", size=(20, 24), **fields):
     wrong[11:14, 9:12, 2] -= 6
     wrong[10, 12, :2] += np.array([9, -9])
     accepted = intervals(codes)
-    why = Why(
-        (("O1-uncorrected", 1.0, 0.9), ("T4-step", 1.05, 0.25)),
+    verdict = check(wrong.astype(np.uint8), accepted)
+    found = why(
+        (
+            ("O1-uncorrected", 1.0, 0.9),
+            ("T4-step + G4-flip-x", (1.05, 1.0), 0.25),
+            ("A1-row-divisor", 1.0, -2.0),
+        ),
         "Opacity is not corrected for the step.",
         np.clip(wrong + (codes - wrong) // 8, 0, 255) / 255,
+        verdict,
     )
-    return Case(name, accepted, check(wrong.astype(np.uint8), accepted), why, **fields)
+    return Case(name, accepted, verdict, found, **fields)
 
 
 def warning(name="coarse"):

@@ -93,8 +93,8 @@ def test_text_of_strangers_stays_text():
         cases.intervals(codes, advice=HOSTILE), causes={HOSTILE: np.full(codes.shape[:2], 0.01)}
     )
     verdict = check(codes.astype(np.uint8), accepted, cause=HOSTILE)
-    why = cases.Why(((HOSTILE, 1.0, 0.5),), HOSTILE, codes / 255)
-    plain = cases.Why((("fault", 1.0, 0.5),), "words", codes / 255)
+    why = cases.why(((HOSTILE, 1.0, 0.5),), HOSTILE, codes / 255, verdict)
+    plain = cases.why((("fault", 1.0, 0.5),), "words", codes / 255, verdict)
     targets = {HOSTILE: codes / 255}
     bad = Case(HOSTILE, accepted, verdict, why, targets, {HOSTILE: HOSTILE})
     good = Case(
@@ -213,6 +213,8 @@ def test_the_verdict_the_reason_and_the_provenance_are_told(page, every):
     assert every[1].explanation.message in paragraphs
     rows = [text for a, text in page.all("tr")]
     assert any(text.startswith("O1-uncorrectedopacity is not corrected") and "90%" in text for text in rows)
+    assert any("steps have another length" in text and "1.05, 1" in text for text in rows)
+    assert any(text.startswith("A1-row-divisor") and text.endswith("nothing") for text in rows)
     assert "sha256 of the scene3b1f" in rows
     assert any(text.startswith("NumPy") and np.__version__ in text for text in rows)
     assert any(text.startswith("filter weights") for text in rows)
@@ -227,10 +229,32 @@ def test_a_page_of_one_image_has_nothing_to_filter_and_one_of_none_says_so(every
 
 
 def test_an_explanation_may_name_nothing(every):
-    none = cases.Why((), "None of the known faults explains this.", None)
-    text = judging_page([dataclasses.replace(every[1], explanation=none)])
-    assert "None of the known faults explains this." in Page(text).texts("p")
-    assert "counterfactual" not in [a.get("value") for a, _ in Page(text).all("input")]
+    said = "None of the known faults explains this."
+    none = cases.why((), said, None, every[1].verdict, "none of these")
+    page = Page(judging_page([dataclasses.replace(every[1], explanation=none)]))
+    assert said in page.texts("p")
+    assert "counterfactual" not in [a.get("value") for a, _ in page.all("input")]
+    assert [text for _, _, text in classes(page, "cause")] == ["no known fault"]
+
+
+def test_faults_that_draw_the_same_here_are_not_told_apart(every):
+    found = dataclasses.replace(every[1].explanation, status="not identifiable here")
+    page = Page(judging_page([dataclasses.replace(every[1], explanation=found)]))
+    (cause,) = [text for _, _, text in classes(page, "cause")]
+    assert cause == "O1-uncorrected explains 90%, or others that look alike"
+
+
+def test_an_image_inside_needs_no_explanation(every):
+    clean = cases.why((), every[0].verdict.message, None, every[0].verdict, "none")
+    page = Page(judging_page([dataclasses.replace(every[0], explanation=clean)]))
+    assert "Why" not in page.texts("h4")
+
+
+def test_a_long_ranking_is_cut_and_said_to_be(every):
+    long = tuple((f"fault {k}", 1.0, 0.9 - 0.05 * k) for k in range(11))
+    found = cases.why(long, "m", None, every[1].verdict)
+    page = Page(judging_page([dataclasses.replace(every[1], explanation=found)]))
+    assert "3 more explain no more than that." in page.texts("p")
 
 
 def test_a_case_of_64_by_64_pixels_takes_less_than_150_kilobytes():

@@ -41,7 +41,7 @@ def small_verdict():
 
 def test_a_counterfactual_of_another_size_is_refused():
     case = cases.passing()
-    why = cases.Why((), "", np.zeros((5, 6, 4)))
+    why = cases.why((), "", np.zeros((5, 6, 4)), case.verdict)
     with pytest.raises(SceneError, match=r"counterfactual must be .* got 6 x 5;"):
         dataclasses.replace(case, explanation=why)
 

@@ -1,42 +1,19 @@
 """A judged image with all that is known about it: what the page of verdicts has a part for."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Protocol
 
 import numpy as np
 
 from volref.arrays import Booleans, Floats
 from volref.errors import SceneError
 from volref.oracle.acceptance import Acceptance
+from volref.oracle.explanation import NONE, Explanation
 from volref.oracle.verdict import LOW_QUALITY, NOT_COMPARABLE, Verdict
 
 # What can come of a case, the worst first: outside, too wide an interval to say, inside with low-quality
 # filtering only, inside.
 KINDS = ("fail", "open", "warn", "pass")
-
-
-class Explained(Protocol):
-    """What the page needs of an explanation.
-
-    ranking: key of the fault, its strength, the share 0..1 of the excess that it explains; best first.
-    counterfactual: what a program with the first of them draws (H, W, 4), None if no fault was found.
-    """
-
-    @property
-    def ranking(self) -> Sequence[tuple[str, float, float]]:
-        """Faults, strengths and shares."""
-        ...
-
-    @property
-    def message(self) -> str:
-        """All of it in words."""
-        ...
-
-    @property
-    def counterfactual(self) -> Floats | None:
-        """The canvas with the fault."""
-        ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +38,7 @@ class Case:
     name: str
     acceptance: Acceptance
     verdict: Verdict
-    explanation: Explained | None = None
+    explanation: Explanation | None = None
     passes: Mapping[str, Floats] = field(default_factory=dict)
     provenance: Mapping[str, str] = field(default_factory=dict)
 
@@ -89,9 +66,14 @@ class Case:
         return "warn" if self.verdict.status.startswith(LOW_QUALITY) else "pass"
 
     @property
+    def why(self) -> Explanation | None:
+        """The explanation, if there is anything to explain."""
+        return None if self.explanation is None or self.explanation.status == NONE else self.explanation
+
+    @property
     def counterfactual(self) -> Floats | None:
         """What a program with the likeliest fault draws, if one was found."""
-        return None if self.explanation is None else self.explanation.counterfactual
+        return None if self.why is None else self.why.counterfactual
 
     @property
     def judges_alpha(self) -> bool:

@@ -8,7 +8,7 @@ from volref.report.verdicts.pixels import sample_of
 from volref.report.verdicts.sections import badge
 from volref.report.verdicts.viewer import choice
 from volref.report.verdicts.views import shown
-from volref.report.verdicts.words import MEANINGS, counts_of, headline, outside_words
+from volref.report.verdicts.words import MEANINGS, cause_words, counts_of, headline, outside_words
 
 # Pixels of the picture in a line.
 MOST_OF_A_LINE = 64 * 64
@@ -46,10 +46,7 @@ def _line(case: Case, number: int) -> str:
     codes = shown(sample(case.candidate))
     # The line says all there is to say: the picture is for the eye alone.
     picture = inline_image(codes, "", *codes.shape[1::-1])
-    cause = ""
-    if case.explanation is not None and case.explanation.ranking:
-        key, _, share = case.explanation.ranking[0]
-        cause = f'<span class="cause">{escape(key)} explains {share:.0%}</span>'
+    cause = f'<span class="cause">{escape(cause_words(case.why))}</span>' if case.why is not None else ""
     return (
         f'<li data-kind="{case.kind}" data-name="{escape(case.name.lower())}">'
         f'<a href="#case-{number}">{picture}'

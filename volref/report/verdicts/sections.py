@@ -6,10 +6,11 @@ from html import escape
 import numpy as np
 
 from volref.arrays import Bytes, Floats
+from volref.oracle.explanation import Explanation, Ranked
 from volref.oracle.faults.table import FAULTS
 from volref.report.markup import facts, inline_image, paragraph, scrolling
 from volref.report.targets import target_picture
-from volref.report.verdicts.cases import Case, Explained
+from volref.report.verdicts.cases import Case
 from volref.report.verdicts.pixels import Sample
 from volref.report.verdicts.viewer import stills, viewer
 from volref.report.verdicts.views import difference_of, difference_picture, scale_of, shown
@@ -19,11 +20,15 @@ from volref.report.verdicts.words import (
     metric_rows,
     outside_words,
     provenance_rows,
+    share_words,
     width_rows,
 )
 
 # Pixels of a render target's picture: larger ones are shown by every second pixel, and so on.
 MOST_OF_A_TARGET = 192 * 192
+
+# Faults that a case lists.
+MOST_OF_A_RANKING = 8
 
 
 def case_section(case: Case, number: int, sample: Sample) -> str:
@@ -33,7 +38,7 @@ def case_section(case: Case, number: int, sample: Sample) -> str:
         paragraph(case.verdict.message),
         viewer(case, number, sample),
         stills(case, sample),
-        _titled("Why", _explanation(case, case.explanation, sample)) if case.explanation is not None else "",
+        _titled("Why", _explanation(case, case.why, sample)) if case.why is not None else "",
         _titled("Pass by pass", _passes(case)) if case.passes else "",
         '<div class="columns">',
         _titled("Metrics", facts(metric_rows(case.verdict.metrics), "Metrics")),
@@ -61,12 +66,12 @@ def _titled(title: str, content: str) -> str:
     return f"<div><h4>{escape(title)}</h4>{content}</div>"
 
 
-def _explanation(case: Case, explained: Explained, sample: Sample) -> str:
-    parts = [paragraph(explained.message)]
-    if explained.counterfactual is not None:
-        parts.append(_counterfactual(case, explained.counterfactual, sample))
-    if explained.ranking:
-        parts.append(_ranking(explained.ranking))
+def _explanation(case: Case, why: Explanation, sample: Sample) -> str:
+    parts = [paragraph(why.message)]
+    if why.counterfactual is not None:
+        parts.append(_counterfactual(case, why.counterfactual, sample))
+    if why.ranking:
+        parts.append(_ranking(why.ranking))
     return "".join(parts)
 
 
@@ -91,20 +96,28 @@ def _figure(case: Case, name: str, codes: Bytes, about: str) -> str:
     return f"<figure>{picture}<figcaption><strong>{name}</strong> {escape(about)}</figcaption></figure>"
 
 
-def _ranking(ranking: Sequence[tuple[str, float, float]]) -> str:
+def _ranking(ranking: Sequence[Ranked]) -> str:
+    seen = ranking[:MOST_OF_A_RANKING]
     rows = "".join(
-        f'<tr><th scope="row">{escape(key)}</th><td>{escape(title_of(key))}</td><td>{strength:.4g}</td>'
-        f"<td>{_bar(share, 1.0)} {share:.0%}</td></tr>"
-        for key, strength, share in ranking
+        f'<tr><th scope="row">{escape(one.fault)}</th><td>{escape(title_of(one.fault))}</td>'
+        f"<td>{escape(_strength(one.strength))}</td>"
+        f"<td>{_bar(one.explained, 1.0)} {share_words(one.explained)}</td></tr>"
+        for one in seen
     )
-    names = ("fault", "what it is", "strength", "explains of the excess")
+    names = ("fault", "what it is", "strength", "explains of what is outside")
     head = "".join(f'<th scope="col">{name}</th>' for name in names)
-    return scrolling("Faults", f"<table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>")
+    table = scrolling("Faults", f"<table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>")
+    rest = len(ranking) - len(seen)
+    return table + paragraph(f"{rest} more explain no more than that." if rest else "")
+
+
+def _strength(strength: float | tuple[float, ...]) -> str:
+    return ", ".join(f"{one:.4g}" for one in (strength if isinstance(strength, tuple) else (strength,)))
 
 
 def title_of(key: str) -> str:
-    """Return what a fault is, of "A+B" what both are, "" for one that is not in the table."""
-    return "; ".join(FAULTS[part].title for part in key.split("+") if part in FAULTS)
+    """Return what a fault is, of two joined what both are, "" for one that is not in the table."""
+    return "; ".join(FAULTS[part].title for part in key.split(" + ") if part in FAULTS)
 
 
 def _causes(case: Case) -> str:

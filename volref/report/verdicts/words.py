@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 
+from volref.oracle.explanation import NONE_OF_THESE, NOT_IDENTIFIABLE, Explanation
 from volref.oracle.metrics import Comparison
 from volref.report.html import version_rows
 from volref.report.markup import Row
@@ -42,6 +43,26 @@ def outside_words(case: Case) -> str:
         return f"none of {judged:,} pixels outside"
     worst = float(case.verdict.excess.max())
     return f"{outside:,} of {judged:,} pixels outside, by up to {in_levels(worst)}"
+
+
+def cause_words(why: Explanation) -> str:
+    """Return the likely cause in a few words."""
+    if why.status == NONE_OF_THESE or not why.ranking:
+        return "no known fault"
+    best = why.ranking[0]
+    others = ", or others that look alike" if why.status == NOT_IDENTIFIABLE else ""
+    return f"{best.fault} explains {share_words(best.explained)}{others}"
+
+
+def share_words(share: float) -> str:
+    """Return which share of what is outside a fault explains.
+
+    Examples
+    --------
+    >>> share_words(0.996), share_words(1.0), share_words(-3.0)
+    ('99%', '100%', 'nothing')
+    """
+    return f"{math.floor(100 * share)}%" if share > 0 else "nothing"
 
 
 def in_levels(number: float) -> str:
