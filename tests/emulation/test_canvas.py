@@ -231,6 +231,13 @@ def test_the_artistic_tone_map_has_the_programs_numbers():
     )
 
 
+@pytest.mark.parametrize("times", [0, 2])
+def test_a_wrong_number_of_encodings_leaves_the_backgrounds_light_as_it_is(times):
+    found = tone_mapped(FRAGMENT, Output(gamma=2.0, blend="shader", encodings=times), BACKGROUND)
+    light = [0.5 + 0.75 / 16, 1 + 0.75 / 4, 3.75]
+    np.testing.assert_allclose(found[:3], [one ** (0.5**times) for one in light], rtol=1e-15)
+
+
 def test_light_below_0_is_black_after_a_gamma():
     found = tone_mapped(np.array([-0.5, 0.0, 1.0, 0.5]), Output(gamma=2.2), BACKGROUND)
     np.testing.assert_array_equal(found, [0, 0, 1, 0.5])

@@ -30,6 +30,10 @@ def _given(value: Plain) -> bool:
     return value is not None
 
 
+def _bends(value: Plain) -> bool:
+    return value != 1.0
+
+
 def _bakes_gradients(value: Plain) -> bool:
     return isinstance(value, str) and value.startswith("sobel")
 
@@ -79,6 +83,7 @@ NEEDS: dict[str, Mapping[str, Test]] = {
     "output.mid": ARTISTIC,
     "output.high": ARTISTIC,
     "output.saturation": ARTISTIC,
+    "output.encodings": {"output.gamma": _bends},
 }
 
 

@@ -104,6 +104,7 @@ class Output(Switches, group="pipeline.output"):
         float, Real("share of colour that 'artistic' keeps; 0 is grey", low=-1e6, high=1e6)
     ] = 1.0
     gamma: Annotated[float, Real("colours are raised to 1 / gamma", low=0.01, high=100)] = 1.0
+    encodings: Annotated[float, Real("how many times they are: 1, or something is wrong", high=4)] = 1.0
     blend: Annotated[
         str,
         Word(

@@ -76,7 +76,7 @@ def tone_mapped(rgba: Floats, output: Output, background: RGBA) -> Floats:
         light = np.array(background[:3], alpha.dtype) ** kind(output.gamma)
         color, alpha = share * color + (1 - alpha) * light, np.ones_like(alpha)
     if output.gamma != 1.0:
-        color = np.maximum(color, 0.0) ** kind(1 / output.gamma)
+        color = np.maximum(color, 0.0) ** kind(output.gamma**-output.encodings)
     return np.concatenate([color, alpha], axis=-1)
 
 
@@ -102,8 +102,10 @@ def store(colors: Floats, kind: str, device: Device) -> Floats:
     return stored(colors, kind, nan=1.0 if device.nan_stored == "one" else 0.0)
 
 
-def draw(canvas: Floats, pixel: Indices, fragments: Floats, output: Output, device: Device) -> None:
-    """Blend fragments into the canvas, at most one for each pixel."""
+def draw(
+    canvas: Floats, pixel: Indices, fragments: Floats, output: Output, device: Device, *, rounds: bool = True
+) -> None:
+    """Blend fragments into the canvas, at most one for each pixel; not rounded to its format if so asked."""
     if output.discard_below is not None:
         kept: Booleans = fragments[:, 3] >= output.discard_below
         pixel, fragments = pixel[kept], fragments[kept]
@@ -112,6 +114,9 @@ def draw(canvas: Floats, pixel: Indices, fragments: Floats, output: Output, devi
     if output.format == "unorm8":
         # Targets of whole numbers clamp colours before they blend them (OpenGL ES 3.0, section 4.1.7).
         fragments = np.clip(fragments, 0.0, 1.0)
+    if not rounds:
+        canvas[pixel] = blended(fragments, canvas[pixel], output.blend)
+        return
     if output.format == "unorm8" and device.blend == "integer":
         codes = blended_codes(_bytes_of(fragments, device), _bytes_of(canvas[pixel], device), output.blend)
         canvas[pixel] = decoded(codes, canvas.dtype)

@@ -10,6 +10,7 @@ from volref.oracle.faults.making import (
     has_atlas,
     has_boxed_atlas,
     replaced,
+    switched,
     switching,
     with_volume,
 )
@@ -25,10 +26,16 @@ def _other_slice(subject: Subject, by: float) -> Subject:
     return with_volume(subject, values=moved)
 
 
-def _without_last_slice(subject: Subject, _: float) -> Subject:
+def _without_last_slice(subject: Subject, held: float) -> Subject:
+    """Return a subject that shows the last but one for the last slice; held at 2: and for all beyond it."""
     values = grid_of(subject).values.copy()
     values[-1] = values[-2]
-    return with_volume(subject, values=values)
+    changed = with_volume(subject, values=values)
+    if held == 1:
+        return changed
+    if subject.pipeline.volume.second_slice == "clamped":
+        return subject
+    return switched(changed, volume={"second_slice": "clamped"})
 
 
 def _uneven(subject: Subject) -> bool:
@@ -69,7 +76,13 @@ ATLAS = (
         where=_several,
         strengths=(1.0, -1.0),
     ),
-    fault("A2-last-tile", "the last slice is never reached", _without_last_slice, where=_several),
+    fault(
+        "A2-last-tile",
+        "the last slice is never reached",
+        _without_last_slice,
+        where=_several,
+        strengths=(1.0, 2.0),
+    ),
     fault(
         "A3-half-slice",
         "slices lie half a slice off: at i / N where (i + 1/2) / N is meant, or the other way",

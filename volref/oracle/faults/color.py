@@ -1,5 +1,7 @@
 """Faults of colour spaces and blending: rows C and B of the table."""
 
+import math
+
 import numpy as np
 
 from volref.oracle.faults.fault import Subject
@@ -14,14 +16,18 @@ GAMMA = 2.2
 
 
 def _bent(subject: Subject, gamma: float) -> Subject:
+    """Return a subject that raises its colours to 1 / gamma once more; a background's light stays as it is."""
     now = subject.pipeline.output.gamma
-    return switched(subject, output={"gamma": gamma * now})
+    if now == 1.0:
+        return switched(subject, output={"gamma": gamma})
+    return switched(subject, output={"encodings": 1.0 + math.log(gamma) / math.log(now)})
 
 
 def _left_as_light(subject: Subject, _: float) -> Subject:
     """Return a subject without its encoding; one that has none, decoded."""
-    now = subject.pipeline.output.gamma
-    return switched(subject, output={"gamma": 1.0 if now != 1.0 else 1.0 / GAMMA})
+    if subject.pipeline.output.gamma == 1.0:
+        return switched(subject, output={"gamma": 1.0 / GAMMA})
+    return switched(subject, output={"encodings": 0.0})
 
 
 def _blended_as_light(subject: Subject, _: float) -> Subject:

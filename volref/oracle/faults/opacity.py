@@ -12,6 +12,16 @@ def _knows_the_step(subject: Subject) -> bool:
     return subject.pipeline.opacity.rule in CORRECTED
 
 
+def _uncorrected(subject: Subject, rest: float) -> Subject:
+    """Return a subject with the table's opacity; rest of 2: what is left of a ray has all of it too."""
+    changed = switched(subject, opacity={"rule": "as-is", "factor": 1.0})
+    if rest == 1:
+        return changed
+    if subject.pipeline.stepping.last_step != "partial":
+        return subject
+    return switched(changed, stepping={"last_step": "whole"})
+
+
 def _stale(subject: Subject, ratio: float) -> Subject:
     factor = factor_of(subject.scene, subject.pipeline, box_of(subject.scene))
     return switched(subject, opacity={"factor": ratio * factor})
@@ -37,8 +47,9 @@ OPACITY = (
     fault(
         "O1-uncorrected",
         "opacity is not corrected for the step",
-        switching(opacity={"rule": "as-is", "factor": 1.0}),
+        _uncorrected,
         where=_knows_the_step,
+        strengths=(1.0, 2.0),
     ),
     fault(
         "O1-stale",
