@@ -41,6 +41,7 @@ FAULTY = (
     Faulty("A3-slice-count", 1, "ramp-by-bright"),
     Faulty("A3-no-interpolation", 1, "ramp-by-bright"),
     Faulty("A3-no-interpolation", 1, "values-as-opacity"),
+    Faulty("A3-bleeding", 1, "clamped-tiles"),
     Faulty("A3-mix-by-x", 1, "f-atlas"),
     Faulty("G1-half-voxel", 0.5, "f-shape"),
     Faulty("G1-half-voxel", -0.5, "f-shape"),

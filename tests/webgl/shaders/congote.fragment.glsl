@@ -1,5 +1,9 @@
 // Seed 001: Congote and others, "Volume Ray Casting in WebGL", 2012.  PRINTED is the chapter to the letter.
-// STEPS and OPAQUE_AT are defined by the page; CLAMPED: coordinates are held half a texel inside their tile.
+// STEPS and OPAQUE_AT are defined by the page.
+//
+// CLAMPED     coordinates are held half a texel inside their tile
+// CENTERS     slice i lies at (i + 1/2) / S
+// LAST_AGAIN  the slice after the last is the last
 //
 // Faults, each by a definition of its strength; some are the chapter's own:
 // FAULT_A1_ROW_DIVISOR        tiles across are taken to be as many as tiles down
@@ -72,6 +76,9 @@ vec4 classified(float value) {
 // Straight colour and opacity, and the value.
 vec4 found_at(vec3 place, out float value) {
   float along = place.z * tiles.z;
+#ifdef CENTERS
+  along = max(along - 0.5, 0.0);
+#endif
 #ifdef FAULT_A3_SLICE_COUNT
   along = place.z * (tiles.z - 1.0);
 #endif
@@ -80,7 +87,11 @@ vec4 found_at(vec3 place, out float value) {
 #endif
   float s1 = floor(along);
   float v1 = in_slice(s1, place.xy, false);
-  float v2 = in_slice(s1 + 1.0, place.xy, true);
+  float s2 = s1 + 1.0;
+#ifdef LAST_AGAIN
+  s2 = min(s2, tiles.z - 1.0);
+#endif
+  float v2 = in_slice(s2, place.xy, true);
   float share = along - s1;
 #ifdef FAULT_A3_MIX_BY_X
   share = place.x * tiles.z - s1;

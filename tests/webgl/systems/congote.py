@@ -32,10 +32,13 @@ def draw(
     uploads = uploads_of(scene, pipeline)
     targets, passes = coordinate_passes(scene, pipeline)
     defines: dict[str, object] = {"STEPS": pipeline.stepping.steps, "OPAQUE_AT": pipeline.stepping.opaque_at}
-    if pipeline.name.endswith("-printed"):
-        defines["PRINTED"] = 1
-    if pipeline.volume.in_tile == "clamped":
-        defines["CLAMPED"] = 1
+    flags = {
+        "PRINTED": pipeline.name.endswith("-printed"),
+        "CLAMPED": pipeline.volume.in_tile == "clamped",
+        "CENTERS": pipeline.volume.slices == "centers",
+        "LAST_AGAIN": pipeline.volume.second_slice == "clamped",
+    }
+    defines |= {name: 1 for name, on in flags.items() if on}
     uniforms = {
         "clip_from_texture": clip_from_texture(scene),
         "front_coordinates": "front_coordinates",
