@@ -67,7 +67,7 @@ def _run(options: argparse.Namespace) -> int:
         **read_limit(options),
     )
     print_json(verdict.as_dict()) if options.json else print(verdict)
-    _write_pictures(options, acceptance, verdict)
+    _write_pictures(options, acceptance, verdict, subject)
     if options.shrink and subject is not None and verdict.outside.any() and not verdict.passed:
         run_shrinking(options, subject)
     return GOOD if verdict.passed else DIFFERS
@@ -114,7 +114,9 @@ def _accepted(subject: "Subject") -> "Acceptance":
     return accept(subject.scene, subject.pipeline, subject.device, subject.jitter, subject.frames)
 
 
-def _write_pictures(options: argparse.Namespace, acceptance: "Acceptance", verdict: "Verdict") -> None:
+def _write_pictures(
+    options: argparse.Namespace, acceptance: "Acceptance", verdict: "Verdict", subject: "Subject | None"
+) -> None:
     from volref.io import write_png
 
     if options.images:
@@ -127,9 +129,10 @@ def _write_pictures(options: argparse.Namespace, acceptance: "Acceptance", verdi
         note(f"wrote {len(PICTURES)} pictures to {folder}")
     if options.page:
         from volref.report.judging import write_judging
-        from volref.report.verdicts.cases import Case
+        from volref.report.verdicts.making import case_of
 
-        case = Case(Path(options.candidate).name, acceptance, verdict)
+        files = {"candidate": options.candidate, "scene": options.scene}
+        case = case_of(Path(options.candidate).name, acceptance, verdict, subject=subject, files=files)
         write_judging(options.page, [case], overwrite=options.force)
         note(f"wrote {options.page}")
 
