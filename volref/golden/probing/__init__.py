@@ -1,0 +1,1 @@
+"""Probes: from what a machine draws of tiny scenes, how it filters, snaps, blends and rounds."""
