@@ -2,7 +2,7 @@
 
 const GAMMA = 2.2;
 
-/** Code values of light: "srgb" and "srgb-target" (IEC 61966-2-1), "gamma2.2", "none"; "decoded" undoes srgb. */
+/** Code values of light: "srgb", "srgb-target" (IEC 61966-2-1), "gamma2.2", "none"; "decoded" undoes srgb. */
 export function encode(light, encoding) {
   if (encoding === "none") return light;
   if (encoding === "decoded") return decodeSrgb(light);
