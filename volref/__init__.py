@@ -58,6 +58,7 @@ if TYPE_CHECKING:
     from volref.oracle.acceptance_files import load_acceptance, save_acceptance
     from volref.oracle.accepting import accept
     from volref.oracle.faults.fault import Subject
+    from volref.oracle.explanation import Explanation, explain
     from volref.oracle.metrics import Comparison, compare
     from volref.oracle.shrinking import shrink
     from volref.oracle.tracing import trace
@@ -104,6 +105,7 @@ __all__ = [
     "Comparison",
     "Device",
     "Emulation",
+    "Explanation",
     "FormatError",
     "Light",
     "Material",
@@ -138,6 +140,7 @@ __all__ = [
     "describe_file",
     "drag",
     "emulate",
+    "explain",
     "jitter_images",
     "load_acceptance",
     "load_bundle",
@@ -201,6 +204,7 @@ _HOMES = {
     "volref.oracle.acceptance_files": ("load_acceptance", "save_acceptance"),
     "volref.oracle.accepting": ("accept",),
     "volref.oracle.faults.fault": ("Subject",),
+    "volref.oracle.explanation": ("Explanation", "explain"),
     "volref.oracle.metrics": ("Comparison", "compare"),
     "volref.oracle.shrinking": ("shrink",),
     "volref.oracle.tracing": ("trace",),

@@ -54,12 +54,16 @@ def is_file(text: str) -> bool:
 
 def read_program(options: argparse.Namespace) -> tuple["Pipeline", "Device"]:
     """Return the program and the device that the options name."""
+    return pipeline_at(options.pipeline), read_device(options)
+
+
+def read_device(options: argparse.Namespace) -> "Device":
+    """Return the device that the options name, the ideal one if they name none."""
     from volref import Device, load_device
 
-    program = pipeline_at(options.pipeline)
     if options.device is None:
-        return program, Device()
-    return program, load_device(options.device) if is_file(options.device) else Device.named(options.device)
+        return Device()
+    return load_device(options.device) if is_file(options.device) else Device.named(options.device)
 
 
 def read_jitter(

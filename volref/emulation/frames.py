@@ -58,19 +58,24 @@ def lanes_of_rays(drawing: Drawing) -> tuple[Drawing, Indices]:
 
 
 def last_targets(
-    drawing: Drawing, marched: Marched, number: int, mean: Floats
+    drawing: Drawing, marched: Marched, number: int, mean: Floats, *, rounds: bool = True
 ) -> tuple[dict[str, Floats], Floats]:
-    """Return the targets that end with the canvas after frame `number`, from 1, and the running mean."""
+    """Return the targets that end with the canvas after frame `number`, from 1, and the running mean.
+
+    The canvas alone is not rounded to its format if so asked.
+    """
     output, device = drawing.pipeline.output, drawing.device
-    frame = drawn(drawing, marched)
+    frame = drawn(drawing, marched, rounds=rounds or output.mean_format is not None)
     if output.mean_format is None:
         return {"canvas": frame}, mean
     mean = mean_of_frames(mean, frame, number, output, device)
-    canvas = store(tone_mapped(mean, output, drawing.scene.background), output.format, device)
+    canvas = tone_mapped(mean, output, drawing.scene.background)
+    if rounds:
+        canvas = store(canvas, output.format, device)
     return {"frame": frame, "running_mean": mean, "canvas": canvas}, mean
 
 
-def drawn(drawing: Drawing, marched: Marched) -> Floats:
+def drawn(drawing: Drawing, marched: Marched, *, rounds: bool = True) -> Floats:
     """Return the target (H * W, 4) of the last pass: the frame, or the canvas."""
     output, device = drawing.pipeline.output, drawing.device
     canvas = cleared(drawing.scene, output, device)
@@ -86,7 +91,7 @@ def drawn(drawing: Drawing, marched: Marched) -> Floats:
         fragments = over_environment(fragments, marched.alpha, canvas[pixel], drawing.pipeline.accumulation)
     if output.mean_format is None:
         fragments = tone_mapped(fragments, output, drawing.scene.background)
-    draw(canvas, pixel, fragments, output, device)
+    draw(canvas, pixel, fragments, output, device, rounds=rounds)
     blank = drawing.ends.blank
     draw(canvas, blank, np.zeros((len(blank), 4), fragments.dtype), output, device)
     missed(canvas, np.concatenate([pixel, blank]), output)

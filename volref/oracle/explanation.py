@@ -18,10 +18,11 @@ from volref.oracle.acceptance import Acceptance
 from volref.oracle.accepting import accept
 from volref.oracle.candidate import ImageSource
 from volref.oracle.explaining import combinations
+from volref.oracle.explaining.drawing import canvas_at
 from volref.oracle.explaining.findings import Finding, ranked
 from volref.oracle.explaining.measuring import Measure, measure_of
 from volref.oracle.explaining.searching import ENOUGH, KEPT, pairs_of, singles
-from volref.oracle.explaining.trying import Progress, Trials, drawn_with, key_of
+from volref.oracle.explaining.trying import Progress, Trials, drawn_with
 from volref.oracle.explaining.wording import explained_by, none_of_these, not_identifiable
 from volref.oracle.faults.fault import Fault, Subject
 from volref.oracle.faults.table import FAULTS
@@ -36,8 +37,9 @@ NOT_IDENTIFIABLE = "not identifiable here"
 # The share of what is outside that a fault has to explain to be the explanation.
 ACCEPTED = 0.8
 
-# Pictures of two faults that are apart by less than this share of what is outside are one picture here.
-SAME = 0.02
+# Two faults are one here if the second leaves no more unexplained than this times as much as the first, and
+# this share of what is outside: it is fitted by a few steps only.
+SAME_TIMES, SAME = 1.25, 0.005
 
 # How many pixels are looked at while faults are tried; the best are measured on all.
 SCREENED = 2048
@@ -210,9 +212,9 @@ def _searched(
     pairs: bool,
 ) -> Explanation:
     """Return the explanation of an image that lies outside."""
-    trials = Trials(subject, measure_of(verdict, acceptance, SCREENED), progress)
+    trials = Trials(subject, measure_of(verdict, acceptance, subject, SCREENED), progress)
     alone = singles(trials, faults)
-    findings, whole = _measured(trials, alone, measure_of(verdict, acceptance))
+    findings, whole = _measured(trials, alone, measure_of(verdict, acceptance, subject))
     if pairs and len(alone) > 1 and findings[0].explained < ENOUGH:
         together = pairs_of(trials, faults, alone)
         findings, whole = _measured(trials, [*findings, *together], whole.measure)
@@ -233,28 +235,43 @@ def _told(findings: list[Finding], alone: list[Finding], whole: Trials, verdict:
     best = findings[0] if findings else None
     keys = {one.key for one in findings}
     every = [*findings, *(one for one in alone if one.key not in keys)]
-    others = [one for one in every[1:] if best is not None and not set(one.rows) & set(best.rows)]
+    if best is None:
+        return _nothing(verdict)
+    others = [one for one in every[1:] if not set(one.rows) & set(best.rows)]
     runner_up = others[0] if others else None
-    rivals = [one for one in others if best is not None and _same_picture(whole, best, one)]
+    simple = (one for one in others if len(one.parts) <= len(best.parts))
+    rivals = [one for one in simple if _as_good(best.explained, one.explained)]
+    status = _status(best.explained, rivals=bool(rivals))
     charts: tuple[str, ...] = ()
-    if best is None or best.explained < ACCEPTED:
-        status, message = NONE_OF_THESE, none_of_these(best)
+    if status == NONE_OF_THESE:
+        message = none_of_these(best)
     elif rivals:
-        status, (message, charts) = NOT_IDENTIFIABLE, not_identifiable(best, rivals)
+        message, charts = not_identifiable(best, rivals)
     else:
-        status, message = EXPLAINED, explained_by(best, runner_up)
+        message = explained_by(best, runner_up)
     everywhere = np.ones_like(verdict.outside)
-    picture = None if best is None else drawn_with(whole.subject, best.parts, everywhere)
     return Explanation(
         status,
         tuple(Ranked(one.key, _strength(one), one.explained) for one in every),
         not rivals,
         runner_up.key if runner_up else "",
         message,
-        picture,
+        drawn_with(whole.subject, best.parts, everywhere, rounds=True),
         charts,
         verdict,
     )
+
+
+def _status(explained: float, *, rivals: bool) -> str:
+    if explained < ACCEPTED:
+        return NONE_OF_THESE
+    return NOT_IDENTIFIABLE if rivals else EXPLAINED
+
+
+def _nothing(verdict: Verdict) -> Explanation:
+    """Return that none of the chosen faults can be had in the program."""
+    message = none_of_these(None)
+    return Explanation(NONE_OF_THESE, (), not verdict.passed, "", message, None, (), verdict)
 
 
 def _strength(finding: Finding) -> float | tuple[float, ...]:
@@ -262,13 +279,9 @@ def _strength(finding: Finding) -> float | tuple[float, ...]:
     return strengths[0] if len(strengths) == 1 else strengths
 
 
-def _same_picture(whole: Trials, best: Finding, other: Finding) -> bool:
-    """Tell whether two findings draw the same picture here, as far as intervals can tell."""
-    if len(other.parts) > len(best.parts) or other.explained < ACCEPTED:
-        return False
-    pair = [whole.looked_at.get(key_of(one.parts)) for one in (best, other)]
-    one, two = pair
-    return one is not None and two is not None and whole.measure.apart(one, two) <= SAME
+def _as_good(best: float, other: float) -> bool:
+    """Tell whether what explains so much is as good an explanation as the best one, as far as can be told."""
+    return other >= ACCEPTED and 1 - other <= SAME_TIMES * (1 - best) + SAME
 
 
 def _of_set(
@@ -279,15 +292,13 @@ def _of_set(
     progress: Progress | None,
 ) -> Explanation:
     """Return which combination of open switches explains an image."""
-    measure = measure_of(verdict, acceptance)
+    measure = measure_of(verdict, acceptance, subject)
     found = combinations.tried(candidates, subject, measure, progress)
-    ranking = tuple(Ranked(one.words, 1.0, one.explained) for one in found)
     best = found[0]
-    same = [one for one in found[1:] if measure.apart(best.looked_at, one.looked_at) <= SAME]
-    if best.explained < ACCEPTED and not verdict.passed:
-        status = NONE_OF_THESE
-    else:
-        status = NOT_IDENTIFIABLE if same else EXPLAINED
+    same = [one for one in found[1:] if _as_good(best.explained, one.explained)]
+    ranking = tuple(Ranked(one.words, 1.0, one.explained) for one in found)
+    status = _status(best.explained, rivals=bool(same))
     message = combinations.words_of(found, same, known=status != NONE_OF_THESE)
     runner_up = found[1].words if len(found) > 1 else ""
-    return Explanation(status, ranking, not same, runner_up, message, best.picture, (), verdict)
+    picture = canvas_at(best.subject, np.ones_like(verdict.outside), rounds=True)
+    return Explanation(status, ranking, not same, runner_up, message, picture, (), verdict)

@@ -3,12 +3,11 @@
 import dataclasses
 from typing import NamedTuple
 
-from volref.arrays import Floats
 from volref.emulation.files.candidates import Candidates
 from volref.emulation.pipeline import Pipeline
 from volref.errors import SceneError
 from volref.oracle.explaining.drawing import canvas_at
-from volref.oracle.explaining.measuring import Measure
+from volref.oracle.explaining.measuring import NOISE, Measure
 from volref.oracle.explaining.trying import Progress
 from volref.oracle.faults.fault import Subject
 
@@ -17,12 +16,11 @@ MOST = 4096
 
 
 class Combination(NamedTuple):
-    """Switches in words, the share of what is outside that they explain, and what they draw."""
+    """Switches in words, the share they explain of what the worst leaves outside, and the program."""
 
     words: str
     explained: float
-    looked_at: Floats
-    picture: Floats
+    subject: Subject
 
 
 def tried(
@@ -38,21 +36,23 @@ def tried(
     if candidates.count > MOST:
         message = f"pipeline.unknown must leave at most {MOST} combinations, got {candidates.count}; "
         raise SceneError(message + "settle some of the switches")
-    found = []
+    left: list[tuple[Subject, float]] = []
     for number, pipeline in enumerate(candidates, start=1):
         one = dataclasses.replace(subject, pipeline=pipeline)
         try:
             picture = canvas_at(one, measure.chosen)
         except SceneError:
             continue
-        seen = measure.looked_at(picture)
-        words = _switches(candidates, pipeline)
-        found.append(Combination(words, measure.explained(seen), seen, picture))
+        left.append((one, measure.outside(measure.looked_at(picture))))
         if progress is not None:
             progress(number, candidates.count)
-    if not found:
+    if not left:
         message = f"pipeline.unknown must leave a program that draws the scene, got {candidates.count} "
         raise SceneError(message + "that do not; open other switches")
+    most = max(max(outside for _, outside in left), NOISE)
+    found = (
+        Combination(_switches(candidates, one.pipeline), 1.0 - outside / most, one) for one, outside in left
+    )
     return sorted(found, key=lambda one: -one.explained)
 
 

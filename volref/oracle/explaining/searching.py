@@ -21,6 +21,9 @@ LEADING = 3
 # Steps of a golden section, each of which leaves 0.62 of the span, and of Gauss and Newton after them.
 STEPS, NEWTON_STEPS, GOLDEN = 3, 4, (5**0.5 - 1) / 2
 
+# Pictures in bytes at strengths closer than this share of the span differ by their rounding, not by a slope.
+LEAST_GAP = 0.02
+
 
 def singles(trials: Trials, faults: list[Fault]) -> list[Finding]:
     """Return what each fault explains, at the best of its strengths."""
@@ -72,7 +75,7 @@ def _refined(trials: Trials, finding: Finding, place: int) -> Finding:
     seen = [finding, *_sections(at, low, high)]
     for _ in range(NEWTON_STEPS):
         seen.sort(key=lambda one: -one.explained)
-        strength = _newton(trials, seen, place)
+        strength = _newton(trials, seen, place, LEAST_GAP * (high - low))
         if strength is None or not low <= strength <= high:
             break
         seen.append(at(strength))
@@ -95,13 +98,13 @@ def _sections(at: Callable[[float], Finding], low: float, high: float) -> list[F
     return seen
 
 
-def _newton(trials: Trials, seen: list[Finding], place: int) -> float | None:
-    """Return where the best strength lies if pictures change evenly from the best to the next best.
+def _newton(trials: Trials, seen: list[Finding], place: int, gap: float) -> float | None:
+    """Return where the best strength lies if pictures change evenly from the best to one some way off.
 
     Differences count by their size, not its square: each is divided by it, and by a level at least.
     """
     best, strength = seen[0], seen[0].parts[place].strength
-    others = (one for one in seen[1:] if one.parts[place].strength != strength)
+    others = (one for one in seen[1:] if abs(one.parts[place].strength - strength) >= gap)
     near = min(others, key=lambda one: abs(one.parts[place].strength - strength), default=None)
     here = trials.looked_at[key_of(best.parts)]
     there = None if near is None else trials.looked_at[key_of(near.parts)]

@@ -61,7 +61,9 @@ def key_of(parts: tuple[Part, ...]) -> Key:
     return tuple((part.fault.key, part.strength) for part in parts)
 
 
-def drawn_with(subject: Subject, parts: tuple[Part, ...], chosen: Booleans) -> Floats | None:
+def drawn_with(
+    subject: Subject, parts: tuple[Part, ...], chosen: Booleans, *, rounds: bool = False
+) -> Floats | None:
     """Return the picture (H, W, 4) of a program with faults at some pixels; None if it cannot be had."""
     subjects = [subject]
     try:
@@ -69,7 +71,7 @@ def drawn_with(subject: Subject, parts: tuple[Part, ...], chosen: Booleans) -> F
             if not part.fault.suits(subjects[-1]):
                 return None
             subjects.append(part.fault.changed(subjects[-1], part.strength))
-        picture = canvas_at(subjects[-1], chosen)
+        picture = canvas_at(subjects[-1], chosen, rounds=rounds)
     except SceneError:
         return None
     for part, before in zip(parts, subjects, strict=False):
