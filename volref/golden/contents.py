@@ -68,6 +68,20 @@ def check_path(where: str, path: str) -> None:
     raise FormatError(message + "use letters, digits, . _ - and /, no part with a dot in front")
 
 
+def check_name(file: Path, name: str) -> None:
+    """Refuse a name that could not be a folder's.
+
+    Raises
+    ------
+    FormatError
+        If it has letters beyond A-Z a-z 0-9 . _ - or begins with a dot.
+    """
+    if len(name) <= LONGEST_PATH and re.fullmatch(_PART, name):
+        return
+    message = f"{file.name}: name must be of letters, digits, . _ and -, got {one_line(name)!r}; "
+    raise FormatError(message + "rename it")
+
+
 def checked_files(folder: Path, entries: Foreign, max_bytes: int) -> dict[str, Path]:
     """Return the files of a manifest by path, after checking that they hold what it says.
 

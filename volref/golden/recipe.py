@@ -21,7 +21,7 @@ from volref.emulation.device import Device
 from volref.emulation.files.documents import load_device, load_pipeline
 from volref.emulation.pipeline import Pipeline
 from volref.errors import FormatError
-from volref.golden.contents import check_path
+from volref.golden.contents import check_name
 from volref.golden.digests import digest_of_file, digest_of_parts
 from volref.golden.generators import scene_of
 from volref.io.documents import check_format, find_problem
@@ -90,7 +90,7 @@ def recipe_of(document: Foreign, file: Path) -> Recipe:
     problem = find_problem(document, schema, schema["$defs"], "")
     if problem is not None:
         raise FormatError(f"{file.name}: {problem}")
-    check_path("name", document["name"])
+    check_name(file, document["name"])
     return Recipe(document, file.parent)
 
 

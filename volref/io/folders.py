@@ -1,6 +1,7 @@
 """Folders that appear whole or not at all, as `atomic` has it for files.
 
-A folder is made beside its place as `.NAME.HEX.part` and renamed when all of it is on the disk.  With
+A folder is made beside its place as `.NAME.HEX.part` and renamed when all of it is there; its files reach the
+disk if `atomic_path` writes them.  With
 `overwrite` the old one moves to `.NAME.HEX.old` first, and is removed after the rename; whoever comes next
 puts it back if a crash fell between the two.
 """
@@ -66,7 +67,6 @@ def atomic_folder(
             part.mkdir()
         yield part
         with _explained(target):
-            _settle(part)
             _move(part, target, replaceable, overwrite=overwrite)
     finally:
         shutil.rmtree(part, ignore_errors=True)
@@ -91,8 +91,9 @@ def _move(part: Path, target: Path, replaceable: Callable[[Path], bool], *, over
     for _ in range(MOST_TRIES):
         _check_place(target, replaceable, overwrite=overwrite)
         old = _sibling(target, "old")
-        with contextlib.suppress(FileNotFoundError):
-            target.rename(old)
+        if overwrite:
+            with contextlib.suppress(FileNotFoundError):
+                target.rename(old)
         try:
             part.rename(target)
         except OSError:
@@ -118,14 +119,6 @@ def _tidy(target: Path) -> None:
                 entry.rename(target)
             elif kind and time.time() - entry.stat().st_mtime > STALE_SECONDS:
                 shutil.rmtree(entry, ignore_errors=True)
-
-
-def _settle(folder: Path) -> None:
-    """Let every file of a folder reach the disk."""
-    for file in folder.rglob("*"):
-        if file.is_file():
-            with file.open("rb+") as stream:
-                os.fsync(stream.fileno())
 
 
 def _sibling(target: Path, kind: str) -> Path:
