@@ -40,15 +40,18 @@ def unprojected_ends(scene: Scene, box: Box, device: Device, surface: Floats | N
 def _on_plane(scene: Scene, box: Box, device: Device, z: float) -> Floats:
     """Return the points (3, R) in texture space of pixel centres on the near plane, z = -1, or the far, 1."""
     kind = device.control_type
-    matrix = texture_from_clip(scene, box).astype(kind)
-    corners = []
-    for x, y in SCREEN:
-        clip = (kind(x), kind(y), kind(z), kind(1))
-        point = [row[0] * clip[0] + row[1] * clip[1] + row[2] * clip[2] + row[3] * clip[3] for row in matrix]
-        corners.append(np.array([point[axis] / point[3] for axis in range(3)], np.float64))
-    a, b, c = corners
+    a, b, c = (corner_on_plane(scene, box, device, (x, y, z)) for x, y in SCREEN)
     across, up = (pixel_ndc(scene.width, scene.height, np.arange(scene.width * scene.height)).T + 1) / 4
     return np.asarray(a[:, None] + (b - a)[:, None] * across + (c - a)[:, None] * up).astype(kind)
+
+
+def corner_on_plane(scene: Scene, box: Box, device: Device, place: tuple[float, float, float]) -> Floats:
+    """Return where (3,) the vertex shader puts a corner of the triangle, x, y and z of clip space."""
+    kind = device.control_type
+    matrix = texture_from_clip(scene, box).astype(kind)
+    clip = (*(kind(number) for number in place), kind(1))
+    point = [row[0] * clip[0] + row[1] * clip[1] + row[2] * clip[2] + row[3] * clip[3] for row in matrix]
+    return np.array([point[axis] / point[3] for axis in range(3)], np.float64)
 
 
 def texture_from_clip(scene: Scene, box: Box) -> Floats:

@@ -1,0 +1,1 @@
+"""Intervals around an emulation: how far a correct machine may be from it, carried through a ray."""

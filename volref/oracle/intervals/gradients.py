@@ -1,0 +1,147 @@
+"""Gradients that are known up to a radius, and what lights make of colours then."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from volref.arrays import Floats, Indices
+from volref.emulation.drawing import Drawing
+from volref.emulation.loop.shading import FLAT, Lights, Place, answered, lights_of, place_of
+from volref.emulation.pipeline import Pipeline
+from volref.emulation.textures.gradient_volume import has_gradient_volume, unpacked
+from volref.oracle.intervals.finding import Finder, Reach, classified, classified_2d, find
+from volref.scene.transform import transform_points
+from volref.stages.gradients import in_world, length_and_direction
+from volref.stages.lighting import lit_colors
+from volref.workspace import Workspace
+
+# Operations between a normal and the light that it sends: some thirty, each of numbers about 1.
+OPERATIONS = 40
+
+
+def has_texture(pipeline: Pipeline) -> bool:
+    """Whether the texture of the volume holds gradients."""
+    return has_gradient_volume(pipeline.lighting)
+
+
+def with_gradient(
+    finder: Finder, value: Floats, radius: Floats, channels: Floats, off: Floats, work: Workspace
+) -> Reach:
+    """Return what may be found of values (n,) and gradients that are fetched as channels (3, n)."""
+    lighting = finder.textures.pipeline.lighting
+    gradient, magnitude = unpacked(channels, lighting)
+    scale = 2.0 if lighting.zero == "half" else 255 / 127
+    gradient_off = scale * off.max(axis=0) + 6 * finder.slack.values
+    reach = 1.7321 * gradient_off + 4 * finder.slack.values * magnitude
+    if finder.textures.pipeline.table.rows > 1:
+        ends, spread = classified_2d(finder, value, radius, magnitude, reach, work)
+    else:
+        ends, spread = classified(finder, value, radius, work)
+    return Reach(ends, spread, value, radius, gradient, magnitude, reach)
+
+
+class Lit(NamedTuple):
+    """How lights meet the samples of a drawing's rays."""
+
+    drawing: Drawing
+    place: Place | None
+    lights: Lights | None
+
+
+def lit_of(drawing: Drawing) -> Lit | None:
+    """Return how lights meet a drawing's samples, None where they do nothing."""
+    if drawing.shade is None:
+        return None
+    lighting = drawing.pipeline.lighting
+    if lighting.model == "none" or not drawing.scene.lights_volume:
+        return Lit(drawing, None, None)
+    place = place_of(drawing.scene, drawing.textures, drawing.box, drawing.ends)
+    return Lit(drawing, place, lights_of(drawing.scene, place) if lighting.model == "cej" else None)
+
+
+def shaded(lit: Lit, finder: Finder, position: Floats, reach: Reach, ray: Indices, radius: Floats) -> Reach:
+    """Return what lights may make of what was found."""
+    lighting = finder.textures.pipeline.lighting
+    ends, spread = reach.ends.copy(), reach.spread.copy()
+    if reach.magnitude is not None and lighting.flat == "skipped":
+        assert reach.gradient_radius is not None
+        maybe = reach.magnitude <= reach.gradient_radius
+        sure = (reach.magnitude == 0) & (finder.slack.values == 0)
+        most = np.abs(ends[:, 3]).max(axis=0)
+        spread[3] = np.where(maybe, spread[3] + most, spread[3])
+        ends[:, 3] = np.where(sure, 0.0, ends[:, 3])
+    if lit.place is None:
+        return reach._replace(ends=ends, spread=spread)
+    light, off = _light(lit, lit.place, finder, position, reach, ray, radius)
+    top = np.abs(ends[:, :3]).max(axis=0)
+    spread[:3] = spread[:3] * (np.abs(light) + off) + top * off
+    ends[:, :3] *= light
+    return reach._replace(ends=ends, spread=spread)
+
+
+def _light(
+    lit: Lit, place: Place, finder: Finder, position: Floats, reach: Reach, ray: Indices, radius: Floats
+) -> tuple[Floats, Floats]:
+    """Return what colours are multiplied by (3, n), and how far that may be off (n,)."""
+    scene, lighting = lit.drawing.scene, finder.textures.pipeline.lighting
+    material = lit.lights.material if lit.lights is not None else scene.material
+    points = transform_points(place.points, position.T.astype(np.float64)).T
+    gradient, gradient_off, _ = _gradient(finder, position, radius, reach)
+    length, normals = length_and_direction(in_world(gradient, place.normals))
+    steepest = float(np.linalg.norm(place.normals[:3, :3], 2))
+    turned = np.where(length > 0, 2 * steepest * gradient_off / np.where(length > 0, length, 1), 2.0)
+    if reach.magnitude is not None and lighting.flat == "ambient":
+        flat = reach.magnitude < FLAT
+        normals = np.where(flat, 0, normals)
+        turned = np.where(flat, 0.0, turned)
+        turned = np.where(np.abs(reach.magnitude - FLAT) <= gradient_off, 2.0, turned)
+    turned = np.minimum(turned + OPERATIONS * finder.slack.values, 2.0)
+    viewer = place.viewer[:, ray]
+    arriving_total = np.zeros(points.shape[1])
+    if lit.lights is None:
+        white = np.ones_like(points)
+        from volref.scene.lights import Material
+
+        light = lit_colors(scene.lights, scene.material or Material(), points, normals, viewer, white)
+        arriving_total += sum(float(np.max(one.color)) for one in scene.lights if one.kind != "ambient")
+    else:
+        light = np.zeros_like(points) + lit.lights.uniform
+        for lamp in lit.lights.lamps:
+            towards, arriving = lamp.arriving(points)
+            light = light + arriving * answered(lit.lights.material, normals, towards, viewer)
+            arriving_total += np.max(arriving, axis=0)
+    if material is None:
+        from volref.scene.lights import Material
+
+        material = Material()
+    shine = 0.0 if material.model == "lambert" else material.specular
+    power = material.shininess * (4 if material.model == "blinn-phong" else 1)
+    moved = material.diffuse * np.minimum(turned, 1) + shine * np.minimum(4 * power * turned, 1)
+    return light, arriving_total * moved + OPERATIONS * finder.slack.values * (1 + np.abs(light).max(axis=0))
+
+
+def _gradient(
+    finder: Finder, position: Floats, radius: Floats, reach: Reach
+) -> tuple[Floats, Floats, Floats]:
+    """Return minus the gradient per voxel (3, n), and how far it may be off (n,), twice."""
+    if reach.gradient is not None and reach.gradient_radius is not None:
+        return reach.gradient, reach.gradient_radius, reach.gradient_radius
+    central, kind, work = (
+        finder.textures.pipeline.lighting.gradient == "central",
+        position.dtype.type,
+        Workspace(),
+    )
+    gradient, off = np.empty(position.shape), np.zeros(position.shape[1])
+    for axis, size in enumerate(finder.textures.size):
+        sides = []
+        for way in (-1, 1) if central else (1,):
+            place = position.copy()
+            place[axis] += kind(way / size)
+            sides.append(find(finder, place, radius + 2 * finder.slack.control, work))
+        if central:
+            gradient[axis] = (sides[0].value - sides[1].value) / 2
+            off = np.hypot(off, (sides[0].radius + sides[1].radius) / 2)
+        else:
+            gradient[axis] = reach.value - sides[0].value
+            off = np.hypot(off, reach.radius + sides[0].radius)
+    return gradient, off, off

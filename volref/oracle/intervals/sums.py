@@ -1,0 +1,160 @@
+"""What a ray may leave on the canvas where its sum is not *over*: intervals, front to back.
+
+n rays of a chunk; colour, alpha and the weighted sum of own alpha are intervals.  These sums are not monotone
+in what is behind them, so an interval is all that is carried; it is wider than need be.
+"""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from volref.arrays import Floats, Indices
+from volref.oracle.intervals import gradients
+from volref.oracle.intervals.compositing import CHUNK, Outcome
+from volref.oracle.intervals.finding import find
+from volref.oracle.intervals.gradients import Lit
+from volref.oracle.intervals.opacities import Share, share_of
+from volref.oracle.intervals.walking import (
+    Course,
+    Pair,
+    advanced,
+    begun,
+    ended_after,
+    ended_before,
+    met,
+    most_iterations,
+    place_of,
+)
+from volref.workspace import Workspace
+
+
+class Sum(NamedTuple):
+    """Colours (C, n) and alpha (n,) between those of two."""
+
+    low: Floats
+    high: Floats
+    alpha: Pair
+
+    def take(self, at: Indices) -> "Sum":
+        """Return some of them."""
+        return Sum(self.low[:, at], self.high[:, at], self.alpha.take(at))
+
+
+# From colour and alpha (C + 1, n) of rays that have met a mesh, and which rays these are, to what is left.
+Meeting = Callable[[Floats, Floats, Indices], tuple[Floats, Floats]]
+
+
+def summed(course: Course, lit: Lit | None, channels: int, meeting: Meeting | None) -> Outcome:
+    """Return what rays may leave, (channels + 1, R), by the program's own sum."""
+    count = len(course.rays.pixel)
+    low, high = np.full((channels + 1, count), np.inf), np.full((channels + 1, count), -np.inf)
+    ends = np.zeros(count)
+    work = Workspace()
+    for first in range(0, count, CHUNK):
+        _run(course, lit, np.arange(first, min(first + CHUNK, count)), (low, high, ends), meeting, work)
+    missing = ~np.isfinite(low).all(axis=0)
+    low[:, missing], high[:, missing] = np.nan_to_num(low[:, missing]), np.nan_to_num(high[:, missing])
+    return Outcome(low, high, np.where(ends > 1, (high - low).max(axis=0), 0.0))
+
+
+def _run(
+    course: Course,
+    lit: Lit | None,
+    ray: Indices,
+    result: tuple[Floats, Floats, Floats],
+    meeting: Meeting | None,
+    work: Workspace,
+) -> None:
+    walk = begun(course, ray)
+    zero = np.zeros(len(ray))
+    channels = len(result[0]) - 1
+    total = Sum(np.zeros((channels, len(ray))), np.zeros((channels, len(ray))), Pair(zero, zero))
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        for number in range(most_iterations(course)):
+            before = ended_before(course, walk, number)
+            _put_down(course, result, walk.ray, total, np.flatnonzero(before.maybe), number)
+            hit = met(course, walk)
+            over = before.sure
+            if hit is not None:
+                at = np.flatnonzero(hit.maybe & ~before.sure)
+                _put_down(course, result, walk.ray, total, at, number, meeting)
+                over = over | hit.sure
+            if over.any():
+                kept = np.flatnonzero(~over)
+                walk.take(kept)
+                total = total.take(kept)
+            if not len(walk.ray):
+                return
+            position, radius, part = place_of(course, walk, number)
+            reach = find(course.finder, position, radius, work)
+            if lit is not None:
+                reach = gradients.shaded(lit, course.finder, position, reach, walk.ray, radius)
+            total = _added(course, total, share_of(course, reach, walk.ray, part))
+            sampled = walk.position
+            advanced(course, walk)
+            after = ended_after(course, walk, sampled, total.alpha)
+            _put_down(course, result, walk.ray, total, np.flatnonzero(after.maybe), number + 1)
+            if after.sure.any():
+                kept = np.flatnonzero(~after.sure)
+                walk.take(kept)
+                total = total.take(kept)
+            if not len(walk.ray):
+                return
+    last = np.arange(len(walk.ray))
+    _put_down(course, result, walk.ray, total, last, most_iterations(course))
+
+
+def _put_down(
+    course: Course,
+    result: tuple[Floats, Floats, Floats],
+    ray: Indices,
+    total: Sum,
+    at: Indices,
+    number: int,
+    meeting: Meeting | None = None,
+) -> None:
+    """Widen the results of rays by what they have if they end now."""
+    if not len(at):
+        return
+    here = ray[at]
+    off = course.finder.slack.values * (4 * number + 8)
+    grown = 1 + np.maximum(np.abs(total.low[:, at]), np.abs(total.high[:, at]))
+    low = np.concatenate([total.low[:, at] - off * grown, total.alpha.low[None, at] - off])
+    high = np.concatenate([total.high[:, at] + off * grown, (total.alpha.high[at] * (1 + off) + off)[None]])
+    if meeting is not None:
+        low, high = meeting(low, high, here)
+    result[0][:, here] = np.minimum(result[0][:, here], low)
+    result[1][:, here] = np.maximum(result[1][:, here], high)
+    result[2][here] += 1
+
+
+def _added(course: Course, total: Sum, share: Share) -> Sum:
+    """Return sums with another sample."""
+    rule = course.drawing.pipeline.accumulation.rule
+    one, two = share.opacity
+    a = Pair(np.minimum(one, two) - share.opacity_off, np.maximum(one, two) + share.opacity_off)
+    c = Pair(share.color.min(axis=0) - share.color_off, share.color.max(axis=0) + share.color_off)
+    alpha = total.alpha
+    if rule == "reversed-over":
+        rest = _product(Pair(1 - a.high, 1 - a.low), alpha)
+        kept = _product(rest, Pair(total.low, total.high))
+        new = _product(a, c)
+        left = _product(Pair(1 - a.high, 1 - a.low), alpha)
+        return Sum(new.low + kept.low, new.high + kept.high, Pair(a.low + left.low, a.high + left.high))
+    weight = _product(Pair(1 - alpha.high, 1 - alpha.low), a)
+    new = _product(weight, c)
+    more = weight if rule == "over" else a
+    grown = Pair(alpha.low + more.low, alpha.high + more.high)
+    if rule == "over":
+        # 1 - (1 - A) (1 - a) grows with both: nothing is gained by taking them apart.
+        grown = Pair(1 - (1 - alpha.low) * (1 - a.low), 1 - (1 - alpha.high) * (1 - a.high))
+    if rule == "add-clamped":
+        grown = Pair(np.minimum(grown.low, 1), np.minimum(grown.high, 1))
+    return Sum(total.low + new.low, total.high + new.high, grown)
+
+
+def _product(one: Pair, two: Pair) -> Pair:
+    """Return the interval of products."""
+    products = np.array([one.low * two.low, one.low * two.high, one.high * two.low, one.high * two.high])
+    return Pair(products.min(axis=0), products.max(axis=0))
