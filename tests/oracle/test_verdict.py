@@ -14,6 +14,7 @@ from volref.io import write_png
 SEEDS = st.integers(0, 10**6)
 ALPHAS = ("premultiplied", "straight", "ignored")
 ENCODINGS = ("none", "srgb", "gamma2.2")
+FLOATS = vr.Pipeline("floats").with_switches(output={"format": "float"})
 CLEAR = np.zeros((2, 3, 4), np.uint8)
 
 
@@ -107,11 +108,37 @@ def test_numbers_read_before_the_canvas_rounds_pass_if_its_rounding_would():
     acceptance = acceptance_of(np.full((1, 1, 4), 100 / 255), np.full((1, 1, 4), 101 / 255))
     for code, passes in ((99.49, False), (99.51, True), (101.49, True), (101.51, False)):
         assert vr.check(np.full((1, 1, 4), code / 255), acceptance).passed is passes
-    # Floats that are bytes have been rounded already.
-    assert not vr.check(np.full((1, 1, 4), np.float32(102 / 255)), acceptance).passed
-    exact = vr.Pipeline("floats").with_switches(output={"format": "float"})
-    stored = dataclasses.replace(acceptance, pipeline=exact)
+    # Floats that are bytes have been rounded already: by how much is told in whole ones.
+    found = vr.check(np.full((1, 1, 4), np.float32(102 / 255)), acceptance)
+    assert "red 102/255, 1/255 above what is accepted, 100/255 to 101/255" in found.message
+    stored = dataclasses.replace(acceptance, pipeline=FLOATS)
     assert not vr.check(np.full((1, 1, 4), 99.9 / 255), stored).passed
+
+
+@given(SEEDS, st.sampled_from(ALPHAS), st.sampled_from(ENCODINGS), st.sampled_from(list(ROUNDINGS)))
+def test_a_canvas_of_floats_passes_in_bytes_whose_alpha_was_rounded_too(seed, alpha, encoding, way):
+    canvas = np.random.default_rng(seed).random((4, 5, 4))
+    canvas[..., :3] *= canvas[..., 3:]
+    codes = ROUNDINGS[way](255 * sent(canvas, alpha, encoding)).astype(np.uint8)
+    acceptance = acceptance_of(canvas, canvas, pipeline=FLOATS)
+    assert vr.check(codes, acceptance, alpha=alpha, encoding=encoding).passed
+
+
+def test_what_is_known_of_alpha_narrows_what_a_rounded_one_leaves_open():
+    end = np.array([[[0.25, 0.25, 0.25, 0.5]]])
+    acceptance = acceptance_of(end, end, pipeline=FLOATS)
+    # Straight, it is half, 127.5/255, rounded either way; divided by 129/255 it would be 126/255.
+    for code, passes in ((126, False), (127, True), (128, True), (129, False)):
+        image = np.array([[[code, code, code, 128]]], np.uint8)
+        assert vr.check(image, acceptance, alpha="straight").passed is passes
+
+
+def test_light_above_1_passes_whether_a_tool_holds_it_to_1_before_it_encodes_it_or_not():
+    end = np.full((1, 1, 4), 2.0)
+    acceptance = acceptance_of(end, end, pipeline=FLOATS)
+    for light in (1.0, 2.0):
+        image = np.full((1, 1, 3), encoded(np.array(light), "srgb"))
+        assert vr.check(image, acceptance, encoding="srgb").passed
 
 
 def test_a_canvas_of_straight_colours_is_delivered_as_it_is_or_multiplied():
