@@ -203,6 +203,15 @@ def test_a_manifest_that_does_not_go_with_itself_is_refused(victim, key, value):
 
 def test_a_bundle_larger_than_allowed_is_refused_before_it_is_read(victim):
     assert "at most 1 KiB" in refusal(victim, max_bytes=1024)
+    sizes = [entry["bytes"] for entry in manifest_of(victim)["files"]]
+    assert "(all files)" in refusal(victim, max_bytes=sum(sizes) - 1)
+    assert vr.load_bundle(victim, max_bytes=sum(sizes)).name == "tiny"
+
+
+def test_a_scene_of_another_size_than_the_image_is_refused(victim):
+    scene = json.loads((victim / "scene.json").read_text())
+    put_file(victim, "scene.json", json.dumps(scene | {"width": WIDTH + 1}).encode())
+    assert f"image must have the size of the scene, {WIDTH + 1} x {HEIGHT}" in refusal(victim)
 
 
 @settings(max_examples=40, suppress_health_check=[HealthCheck.function_scoped_fixture])

@@ -157,6 +157,23 @@ def test_a_folder_that_appears_meanwhile_is_not_replaced(tmp_path):
     assert names(tmp_path) == ["one"]
 
 
+def test_a_folder_that_appears_at_the_last_moment_is_not_replaced(tmp_path, monkeypatch):
+    check, calls = folders._check_place, []
+
+    def slow_check(target, *kinds, **options):
+        check(target, *kinds, **options)
+        calls.append(target)
+        if len(calls) == 2:  # between the look and the rename
+            target.mkdir()
+            (target / "a.txt").write_text("theirs")
+
+    monkeypatch.setattr(folders, "_check_place", slow_check)
+    with pytest.raises(FormatError, match="must not exist yet"):
+        write(tmp_path / "one", "mine")
+    assert read(tmp_path / "one") == "theirs"
+    assert names(tmp_path) == ["one"]
+
+
 def test_a_place_that_cannot_be_written_is_said(tmp_path):
     (tmp_path / "file").write_text("x")
     with pytest.raises(FormatError, match="must be a folder that can be written"):
