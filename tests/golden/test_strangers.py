@@ -146,6 +146,23 @@ def test_a_file_that_the_scene_names_but_nobody_lists_is_refused(victim):
     assert "got none for 'other.npy'" in refusal(victim)
 
 
+def test_a_file_beside_the_volume_that_would_move_it_is_refused_unless_listed(victim):
+    (victim / "scene.volume.npy.json").write_text('{"spacing": [2, 2, 2]}')
+    assert "got none for 'scene.volume.npy.json'" in refusal(victim)
+
+
+def test_a_scene_may_name_no_format_that_names_other_files(victim):
+    scene = json.loads((victim / "scene.json").read_text())
+    (victim / "scene.volume.npy").rename(victim / "scene.obj")
+    document = manifest_of(victim)
+    entry = next(entry for entry in document["files"] if entry["path"] == "scene.volume.npy")
+    entry["path"] = "scene.obj"
+    put_manifest(victim, document)
+    scene["volume"]["path"] = "scene.obj"
+    put_file(victim, "scene.json", json.dumps(scene).encode())
+    assert "must name .npy, .npz, .json files" in refusal(victim)
+
+
 def test_files_that_nobody_lists_are_not_looked_at(victim):
     (victim / "notes.txt").write_text("mine")
     (victim / "expected/extra.npy").write_bytes(b"not an array")

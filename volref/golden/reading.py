@@ -25,6 +25,9 @@ from volref.scene.scene import Scene
 IMAGES = ("nominal", "lo", "hi", "raw_lo", "raw_hi")
 MASKS = ("ambiguous", "drawn")
 
+# What `save_scene` writes beside a scene.
+SCENE_FILES = (".npy", ".npz", ".json")
+
 
 def load_bundle(folder: str | Path, *, max_bytes: int = DEFAULT_MAX_BYTES) -> Bundle:
     """Return the golden bundle in a folder.
@@ -117,8 +120,14 @@ def _built(place: Path, document: dict[str, Any], arrays: _Arrays) -> Bundle:
 
 
 def _scene(place: Path, document: dict[str, Any], arrays: _Arrays) -> Scene:
-    """Return the scene, all of whose files are listed."""
-    check_listed(paths_in(read_json(place / "scene.json")), arrays.files)
+    """Return the scene, all of whose files are listed and of formats that name no others."""
+    named = paths_in(read_json(place / "scene.json"))
+    beside = [f"{path}.json" for path in named if (place / f"{path}.json").exists()]
+    check_listed([*named, *beside], arrays.files)
+    for path in named:
+        if Path(path).suffix not in SCENE_FILES:
+            message = f"scene.json must name {', '.join(SCENE_FILES)} files in a bundle, got {path!r}; "
+            raise FormatError(message + "make the bundle again")
     scene = load_scene(place / "scene.json", max_bytes=arrays.max_bytes)
     image = document["image"]
     if (scene.width, scene.height) == (image["width"], image["height"]):
