@@ -56,15 +56,18 @@ def test_what_a_failure_needs_is_kept_where_it_was():
     np.testing.assert_allclose(found.scene.volume.origin, place[:3], rtol=0, atol=1e-14)
 
 
-def test_a_face_that_is_needed_is_found_among_many():
+def test_a_face_that_is_needed_is_found_among_many_and_keeps_its_colour():
     scene = example(mesh=True)
-    (mesh,) = scene.meshes
+    colors = np.random.default_rng(0).random((len(scene.meshes[0].faces), 3))
+    mesh = dataclasses.replace(scene.meshes[0], colors=colors, coloring="face")
+    scene = dataclasses.replace(scene, meshes=(mesh,))
     wanted = mesh.vertices[mesh.faces[37]]
 
     def fails(subject):
         return any((one.vertices[face] == wanted).all() for one in subject.scene.meshes for face in one.faces)
 
-    assert size(shrink(subject_of(scene), fails))[4] == 1
+    (left,) = shrink(subject_of(scene), fails).scene.meshes
+    assert left.colors.tolist() == [colors[37].tolist()]
 
 
 def test_no_more_is_asked_than_allowed_and_the_smallest_by_then_is_returned():
