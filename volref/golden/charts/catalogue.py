@@ -80,7 +80,7 @@ _ALL = (
         ("C1", "O1"),
     ),
     Chart("lit-sphere", "a lit ball, a mean of 2 frames", surroundings.lit_sphere, CEJ, ("N1", "J1"), 2),
-    Chart("lit-turned", "the F, lit, of long voxels", surroundings.lit_turned, CEJ, ("N1", "J1"), 1),
+    Chart("lit-turned", "a lit ball of long voxels", surroundings.lit_turned, CEJ, ("N1", "J1"), 1),
 )
 
 CHARTS: dict[str, Chart] = {chart.name: chart for chart in _ALL}

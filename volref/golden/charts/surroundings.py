@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import ArrayLike
 
+from volref.arrays import Vector
 from volref.golden.charts.building import (
     BLUE,
     HEIGHT,
@@ -104,14 +105,21 @@ def _lit(volume: Volume, direction: ArrayLike, material: Material) -> Scene:
     return Scene(volume, look, camera, WIDTH, HEIGHT, lights=lights, material=material)
 
 
+def _hill(spacing: Vector = (1.0, 1.0, 1.0), direction: ArrayLike | None = None) -> Volume:
+    """Return values that fall evenly from a point near the middle: gradients are long everywhere."""
+    x, y, z = indices(12, 12, 12)
+    away = np.sqrt((x - 6.0) ** 2 + 0.7 * (y - 5.3) ** 2 + 1.4 * (z - 5.0) ** 2)
+    return bytes_volume(255 * np.clip(1.1 - away / 5.2, 0, 1), spacing, direction)
+
+
 def lit_sphere() -> Scene:
     """Return a ball under a sun, a lamp and a sky."""
     return _lit(
-        _ball(), (0.5, 0.6, 1.0), Material("phong", ambient=0.4, diffuse=0.8, specular=0.8, shininess=30)
+        _hill(), (0.5, 0.6, 1.0), Material("phong", ambient=0.4, diffuse=0.8, specular=0.2, shininess=6)
     )
 
 
 def lit_turned() -> Scene:
-    """Return F of voxels of three lengths, turned, under the same lights."""
-    volume = letter(9, (1.2, 0.9, 0.6), direction=TURN)
+    """Return a ball of voxels of three lengths, turned, under the same lights."""
+    volume = _hill((1.2, 0.9, 0.6), TURN)
     return _lit(volume, TURN @ (0.5, 0.4, 1.0), Material("lambert", ambient=0.4, diffuse=0.8))
