@@ -19,6 +19,7 @@ from volref.golden.charts import Chart
 
 # What the papers' own misprints are called in the shaders.
 OWN = {
+    "O2-add-alpha": "ADDED_ALPHA",
     "D1-window-over-w": "WINDOW_OVER_W",
     "D1-packing": "PACKING_PRINTED",
     "D2-squared-alpha": "OBJECT_PRINTED",

@@ -115,6 +115,14 @@ def _placed(job: Job, texture_from_texture: np.ndarray) -> Job:
     return with_passes(job, change)
 
 
+def _moved(job: Job, scene: Scene, voxels: float) -> Job:
+    """A box so many voxels beside its place, with all that is in it."""
+    assert isinstance(scene.volume, Volume)
+    matrix = np.eye(4)
+    matrix[:3, 3] = -voxels / np.array(scene.volume.size)
+    return _placed(job, matrix)
+
+
 def _narrower(job: Job, scene: Scene, _: float) -> Job:
     """A box from the first voxel's centre to the last one's, filled with all of the texture."""
     assert isinstance(scene.volume, Volume)
@@ -197,6 +205,7 @@ PAGE: Mapping[str, Page] = {
     "G4-flip-y": with_values(VOLUMES, lambda values, _: np.flip(values, 1)),
     "G4-flip-z": with_values(VOLUMES, lambda values, _: np.flip(values, 0)),
     "G4-swapped-axes": with_values(VOLUMES, lambda values, _: np.swapaxes(values, 1, 2)),
+    "G1-moved-box": _moved,
     "G2-node-box": _narrower,
     "G5-transform-ignored": _unturned,
     "O5-premultiplied-twice": with_values(TABLES, _premultiplied),

@@ -27,9 +27,13 @@
 // FAULT_C1_SRGB_NEVER             colours are decoded, and not encoded again
 // FAULT_L3_PRE_CLASSIFIED         the volume holds colours and opacities
 // FAULT_M1_AVERAGE                samples are averaged
+// FAULT_M1_MAXIMUM                the most opaque sample is all that is seen
 precision highp float;
 precision highp sampler2D;
 precision highp sampler3D;
+#if defined(FAULT_M1_AVERAGE) || defined(FAULT_M1_MAXIMUM)
+#define GATHERED
+#endif
 
 in highp vec2 ndc;
 uniform sampler3D volume;
@@ -160,9 +164,9 @@ void main() {
 #ifdef FAULT_T2_FIRST_STEP_DROPPED
     begin_at = 1;
 #endif
-#ifdef FAULT_M1_AVERAGE
-    vec4 sum = vec4(0.0);
-    float samples = 0.0;
+#ifdef GATHERED
+    vec4 gathered = vec4(0.0);
+    float samples = 1.0;
 #endif
     for (int i = begin_at; ; i++) {
       float begin = float(i) * walked;
@@ -198,9 +202,11 @@ void main() {
 #else
       alpha += weight;
 #endif
-#ifdef FAULT_M1_AVERAGE
-      sum += vec4(found.rgb, 1.0) * found.a;
-      samples += 1.0;
+#if defined(FAULT_M1_AVERAGE)
+      gathered += vec4(found.rgb, 1.0) * found.a;
+      samples = float(i + 1);
+#elif defined(FAULT_M1_MAXIMUM)
+      if (found.a > gathered.a) gathered = vec4(found.rgb, 1.0) * found.a;
 #else
 #ifdef FAULT_T1_NOT_RENORMALISED
       if (alpha >= FAULT_T1_NOT_RENORMALISED) alpha = 1.0;
@@ -208,9 +214,9 @@ void main() {
       if (alpha >= opaque_at) break;
 #endif
     }
-#ifdef FAULT_M1_AVERAGE
-    color = sum.rgb / samples;
-    alpha = sum.a / samples;
+#ifdef GATHERED
+    color = gathered.rgb / samples;
+    alpha = gathered.a / samples;
 #endif
   }
   color += (1.0 - alpha) * object.rgb;
