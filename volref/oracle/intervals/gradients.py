@@ -72,17 +72,17 @@ def shaded(lit: Lit, finder: Finder, position: Floats, reach: Reach, ray: Indice
         ends[:, 3] = np.where(sure, 0.0, ends[:, 3])
     if lit.place is None:
         return reach._replace(ends=ends, spread=spread)
-    light, off = _light(lit, lit.place, finder, position, reach, ray, radius)
-    top = np.abs(ends[:, :3]).max(axis=0)
+    light, shine, off = _light(lit, lit.place, finder, position, reach, ray, radius)
+    top = np.maximum(np.abs(ends[:, :3]).max(axis=0), 1.0 if np.any(shine) else 0.0)
     spread[:3] = spread[:3] * (np.abs(light) + off) + top * off
-    ends[:, :3] *= light
+    ends[:, :3] = ends[:, :3] * light + shine
     return reach._replace(ends=ends, spread=spread)
 
 
 def _light(
     lit: Lit, place: Place, finder: Finder, position: Floats, reach: Reach, ray: Indices, radius: Floats
-) -> tuple[Floats, Floats]:
-    """Return what colours are multiplied by (3, n), and how far that may be off (n,)."""
+) -> tuple[Floats, Floats, Floats]:
+    """Return what colours are multiplied by and what is added (3, n), and how far both may be off (n,)."""
     scene, lighting = lit.drawing.scene, finder.textures.pipeline.lighting
     material = lit.lights.material if lit.lights is not None else scene.material
     points = transform_points(place.points, position.T.astype(np.float64)).T
@@ -98,11 +98,14 @@ def _light(
     turned = np.minimum(turned + OPERATIONS * finder.slack.values, 2.0)
     viewer = place.viewer[:, ray]
     arriving_total = np.zeros(points.shape[1])
+    shine_on = np.zeros_like(points)
     if lit.lights is None:
-        white = np.ones_like(points)
         from volref.scene.lights import Material
 
-        light = lit_colors(scene.lights, scene.material or Material(), points, normals, viewer, white)
+        # Highlights have the colour of the light, whatever they lie on: black shows them alone.
+        lights, matter = scene.lights, scene.material or Material()
+        shine_on = lit_colors(lights, matter, points, normals, viewer, np.zeros_like(points))
+        light = lit_colors(lights, matter, points, normals, viewer, np.ones_like(points)) - shine_on
         arriving_total += sum(float(np.max(one.color)) for one in scene.lights if one.kind != "ambient")
     else:
         light = np.zeros_like(points) + lit.lights.uniform
@@ -117,7 +120,8 @@ def _light(
     shine = 0.0 if material.model == "lambert" else material.specular
     power = material.shininess * (4 if material.model == "blinn-phong" else 1)
     moved = material.diffuse * np.minimum(turned, 1) + shine * np.minimum(4 * power * turned, 1)
-    return light, arriving_total * moved + OPERATIONS * finder.slack.values * (1 + np.abs(light).max(axis=0))
+    largest = np.abs(light).max(axis=0) + np.abs(shine_on).max(axis=0)
+    return light, shine_on, arriving_total * moved + OPERATIONS * finder.slack.values * (1 + largest)
 
 
 def _gradient(
