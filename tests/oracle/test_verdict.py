@@ -10,6 +10,7 @@ import volref as vr
 from tests.emulation.scenes import example
 from tests.oracle.made_up import ROUNDINGS, acceptance_of, byte_intervals, encoded, sent
 from volref.io import write_png
+from volref.oracle import readings
 
 SEEDS = st.integers(0, 10**6)
 ALPHAS = ("premultiplied", "straight", "ignored")
@@ -208,6 +209,19 @@ def test_a_turned_image_with_another_fault_is_still_recognised_and_a_plain_fault
     turned[6, 8] = 255
     assert "upside down: read so, all but 1 pixels lie inside" in vr.check(turned, acceptance).message
     assert vr.check(np.minimum(canvas, 40), acceptance).recognised == ""
+
+
+@pytest.mark.parametrize("name", ["upside down", "turned by 180 degrees", "BGR, not RGB"])
+def test_a_large_image_is_recognised_as_a_small_one_is(name, drawn):
+    image = np.tile(drawn[0], (21, 11, 1))[:-1]  # an odd number of rows
+    image[:12] //= 2  # so that no turn leaves it as it is
+    tiled = acceptance_of(image / 255, image / 255)
+    assert image.size // 4 > 2 * readings.ENOUGH_PIXELS
+    turned = TURNS[name](image).copy()
+    found = vr.check(turned, tiled)
+    assert found.recognised.startswith(f"the image seems to be {name}: read so, every pixel lies inside")
+    turned[100, 50] = 255
+    assert "read so, all but 1 pixels lie inside" in vr.check(turned, tiled).message
 
 
 def test_an_image_of_another_size_is_refused_with_what_its_size_tells():
