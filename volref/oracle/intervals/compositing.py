@@ -14,44 +14,29 @@ Programs with other sums are taken front to back, with intervals of colour and a
 """
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
 from volref.arrays import Booleans, Floats, Indices
-from volref.oracle.intervals import gradients
-from volref.oracle.intervals.finding import find
 from volref.oracle.intervals.gradients import Lit
-from volref.oracle.intervals.opacities import Share, share_of
-from volref.oracle.intervals.walking import (
-    Course,
-    Pair,
-    Test,
-    advanced,
-    begun,
-    ended_after,
-    ended_before,
-    met,
-    most_iterations,
-    place_of,
-)
+from volref.oracle.intervals.iterations import Iteration, iterations
+from volref.oracle.intervals.opacities import Share
+from volref.oracle.intervals.walking import Course, Pair, Test, opaque
 from volref.workspace import Workspace
+
+# Results of rays on the way back, from least to greatest (C + 1, n), and what ends decide of them (n,).
+Results: TypeAlias = tuple[Floats, Floats, Floats]
 
 # Rays taken together: their samples are kept until the way back.
 CHUNK = 1 << 12
 
 
 class Step(NamedTuple):
-    """One iteration of the rays at `at` (n,) of a chunk: what they may add, and how the ray may end.
+    """An iteration, and which of its rays (n,) may end after it."""
 
-    share: None where no ray may take this sample.  before, hit, after: which ends there may be.
-    """
-
-    at: Indices
-    share: Share | None
-    before: Test
-    hit: Test | None
-    after: Test | None
+    iteration: Iteration
+    after: Test
 
 
 class Outcome(NamedTuple):
@@ -94,46 +79,17 @@ def composited(course: Course, lit: Lit | None, behind: Behind) -> Outcome:
 def _steps(course: Course, lit: Lit | None, ray: Indices, work: Workspace) -> list[Step]:
     """Return the iterations of rays, as far as any of them may go."""
     steps: list[Step] = []
-    alpha = Pair(np.zeros(len(ray)), np.zeros(len(ray)))
-    walk, at = begun(course, ray), np.arange(len(ray))
-    thresholded = course.drawing.pipeline.stepping.opaque_at is not None
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        for number in range(most_iterations(course)):
-            before = ended_before(course, walk, number)
-            hit = met(course, walk)
-            over = before.sure if hit is None else before.sure | hit.sure
-            if over.any():
-                if over.all() or hit is not None:
-                    # What they meet must be known even where none goes on.
-                    gone = np.flatnonzero(over)
-                    part = None if hit is None else Test(hit.sure[gone], hit.maybe[gone])
-                    steps.append(
-                        Step(at[gone], None, Test(before.sure[gone], before.maybe[gone]), part, None)
-                    )
-                kept = np.flatnonzero(~over)
-                walk.take(kept)
-                at, alpha = at[kept], alpha.take(kept)
-                before = Test(before.sure[kept], before.maybe[kept])
-                hit = None if hit is None else Test(hit.sure[kept], hit.maybe[kept])
-            if not len(at):
-                break
-            position, radius, part_of_step = place_of(course, walk, number)
-            reach = find(course.finder, position, radius, work)
-            if lit is not None:
-                reach = gradients.shaded(lit, course.finder, position, reach, walk.ray, radius)
-            share = share_of(course, reach, walk.ray, part_of_step)
-            if thresholded:
-                alpha = _more(alpha, share)
-            sampled = walk.position
-            advanced(course, walk)
-            after = ended_after(course, walk, sampled, alpha)
-            steps.append(Step(at, share, before, hit, after))
-            if after.sure.any():
-                kept = np.flatnonzero(~after.sure)
-                walk.take(kept)
-                at, alpha = at[kept], alpha.take(kept)
-                if not len(at):
-                    break
+    low, high = np.zeros(len(ray)), np.zeros(len(ray))
+    threshold, gone = course.drawing.pipeline.stepping.opaque_at, np.zeros(len(ray), np.bool_)
+    for one in iterations(course, lit, ray, gone, work):
+        after = one.after
+        if threshold is not None:
+            some = one.at[one.some]
+            low[some], high[some] = _more(Pair(low[some], high[some]), one.share)
+            full = opaque(course, Pair(low[one.at], high[one.at]), threshold)
+            after = Test(after.sure | full.sure, after.maybe | full.maybe)
+            gone[one.at] |= full.sure
+        steps.append(Step(one, after))
     return steps
 
 
@@ -149,22 +105,15 @@ def _backwards(course: Course, steps: list[Step], behind: Behind) -> tuple[Float
     """Return the least and the greatest of rays (C + 1, n), from the last sample to the first."""
     low, high = behind.end.low.copy(), behind.end.high.copy()
     branch, taken = np.zeros(low.shape[1]), np.zeros(low.shape[1])
-    for step in reversed(steps):
-        at = step.at
-        every = len(at) == low.shape[1]
-        here = (low, high) if every else (low[:, at], high[:, at])
-        spread = branch if every else branch[at]
-        if step.after is not None:
-            spread = _or_else(here, spread, behind.end, at, step.after.maybe)
-        if step.share is not None:
-            here, spread = _in_front(step.share, here, spread)
-            taken[at] += 1
-        spread = _or_else(here, spread, behind.end, at, step.before.maybe, step.before.sure)
-        if step.hit is not None:
-            spread = _or_else(
-                here, spread, behind.mesh, at, step.hit.maybe, step.hit.sure & ~step.before.maybe
-            )
-        low[:, at], high[:, at], branch[at] = *here, spread
+    for (at, before, hit, _, some, share), after in reversed(steps):
+        here = low, high, branch
+        _or_else(here, behind.end, at, after.maybe, after.sure)
+        if len(some):
+            _in_front(share, here, at[some])
+            taken[at[some]] += 1
+        _or_else(here, behind.end, at, before.maybe, before.sure)
+        if hit is not None:
+            _or_else(here, behind.mesh, at, hit.maybe, hit.sure & ~before.maybe)
     # An alpha of n sums is off by at most n u A, a colour by n u C and by n u A times the brightest sample.
     largest = np.maximum(np.abs(low), np.abs(high))
     brightest = _brightest(course)
@@ -180,70 +129,62 @@ def _brightest(course: Course) -> float:
     return max(table, 1.0) * max(lit.factor, 1.0) * (2 * lights if lit.model != "none" else 1.0)
 
 
-def _or_else(
-    here: tuple[Floats, Floats],
-    spread: Floats,
-    other: Pair,
-    at: Indices,
-    maybe: Booleans,
-    sure: Booleans | None = None,
-) -> Floats:
-    """Widen results (C + 1, n), in place, by another outcome where it may be had; return what ends decide."""
+def _or_else(here: Results, other: Pair, at: Indices, maybe: Booleans, sure: Booleans) -> None:
+    """Widen the results of rays, in place, by another outcome where it may be had, alone where it is sure."""
     chosen = np.flatnonzero(maybe)
     if not len(chosen):
-        return spread
-    low, high = here
-    outcome = other.take(at[chosen])
-    before = low[:, chosen], high[:, chosen]
+        return
+    low, high, branch = here
+    ray, only = at[chosen], sure[chosen]
+    outcome = other.take(ray)
+    before = low[:, ray], high[:, ray]
     least, most = np.minimum(before[0], outcome.low), np.maximum(before[1], outcome.high)
     widened = ((most - least) - (before[1] - before[0])).max(axis=0)
-    if sure is not None:
-        only = sure[chosen]
-        least, most = np.where(only, outcome.low, least), np.where(only, outcome.high, most)
-        widened = np.where(only, 0.0, widened)
-    low[:, chosen], high[:, chosen] = least, most
-    spread = spread.copy()
-    spread[chosen] += widened
-    return spread
+    low[:, ray], high[:, ray] = np.where(only, outcome.low, least), np.where(only, outcome.high, most)
+    branch[ray] = np.where(only, 0.0, branch[ray] + widened)
 
 
-def _in_front(
-    share: Share, here: tuple[Floats, Floats], spread: Floats
-) -> tuple[tuple[Floats, Floats], Floats]:
-    """Return results (C + 1, n) behind another sample, and what ends decide of them."""
-    low, high = here
+def _in_front(share: Share, here: Results, ray: Indices) -> None:
+    """Put samples in front of the results of rays, in place."""
+    if share.opacity.max() > 1:
+        _in_front_of_more(share, here, ray)
+        return
+    every = len(ray) == here[0].shape[1]
+    low, high = (side if every else np.take(side, ray, axis=1) for side in here[:2])
     (a0, a1), (c0, c1) = share.opacity, share.color
-    channels = len(low) - 1
-    new_low, new_high = np.empty_like(low), np.empty_like(high)
+    count = len(c0)
     q0, q1 = 1 - a0, 1 - a1
-    if a0.max(initial=0.0) > 1 or a1.max(initial=0.0) > 1:
-        return _in_front_of_more(share, here, spread)
+    # Of the colours, alpha's own being 1: those of the samples come first, what is behind after them.
     p0, p1 = a0 * c0, a1 * c1
-    np.minimum(p0 + q0 * low[:channels], p1 + q1 * low[:channels], out=new_low[:channels])
-    np.maximum(p0 + q0 * high[:channels], p1 + q1 * high[:channels], out=new_high[:channels])
-    apart = np.abs(a1 - a0)
-    most = np.maximum(a0, a1) + share.opacity_off
-    brightest = np.maximum(np.abs(c0), np.abs(c1)) + share.color_off
-    beside = most * share.color_off + 0.25 * apart * np.abs(c1 - c0)
-    beside += share.opacity_off * np.maximum(brightest, np.abs(high[:channels]))
-    new_low[:channels] -= beside
-    new_high[:channels] += beside
-    least, greatest = np.minimum(q0, q1) - share.opacity_off, np.maximum(q0, q1) + share.opacity_off
-    new_low[channels] = np.maximum(1 - greatest * (1 - low[channels]), 0)
-    new_high[channels] = np.minimum(1 - np.maximum(least, 0) * (1 - high[channels]), 1)
-    return (new_low, new_high), spread * np.minimum(greatest, 1)
+    least = np.minimum(p0 + q0 * low[:count], p1 + q1 * low[:count])
+    most = np.maximum(p0 + q0 * high[:count], p1 + q1 * high[:count])
+    beside = np.maximum(c0, c1)
+    beside += share.color_off
+    np.maximum(beside, high[:count], out=beside)
+    beside *= share.opacity_off
+    beside += (np.maximum(a0, a1) + share.opacity_off) * share.color_off
+    sag = np.abs((a1 - a0) * (c1 - c0))
+    sag *= 0.25
+    beside += sag
+    np.subtract(least, beside, out=least)
+    np.add(most, beside, out=most)
+    clear, thick = np.maximum(q0, q1) + share.opacity_off, np.minimum(q0, q1) - share.opacity_off
+    opaque_low = np.maximum(1 - clear * (1 - low[count]), 0)
+    opaque_high = np.minimum(1 - np.maximum(thick, 0) * (1 - high[count]), 1)
+    here[0][:count, ray], here[1][:count, ray] = least, most
+    here[0][count, ray], here[1][count, ray] = opaque_low, opaque_high
+    here[2][ray] *= np.minimum(clear, 1)
 
 
-def _in_front_of_more(
-    share: Share, here: tuple[Floats, Floats], spread: Floats
-) -> tuple[tuple[Floats, Floats], Floats]:
-    """Return the same where opacities may be above 1, and more behind makes less of the result."""
+def _in_front_of_more(share: Share, here: Results, ray: Indices) -> None:
+    """Do the same where opacities may be above 1, and more behind makes less of the result."""
     ones = np.ones((1, share.opacity.shape[1]))
-    results = []
+    behind = here[0][:, ray], here[1][:, ray]
+    results: list[Floats] = []
     for a in (share.opacity.min(axis=0) - share.opacity_off, share.opacity.max(axis=0) + share.opacity_off):
         for color in (share.color.min(axis=0) - share.color_off, share.color.max(axis=0) + share.color_off):
             front = a * np.concatenate([color, ones])
-            results += [front + (1 - a) * bound for bound in here]
+            results += [front + (1 - a) * bound for bound in behind]
     stacked = np.array(results)
-    widest = np.abs(1 - share.opacity).max(axis=0) + share.opacity_off
-    return (stacked.min(axis=0), stacked.max(axis=0)), spread * widest
+    here[0][:, ray], here[1][:, ray] = stacked.min(axis=0), stacked.max(axis=0)
+    here[2][ray] *= np.abs(1 - share.opacity).max(axis=0) + share.opacity_off

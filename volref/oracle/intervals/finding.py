@@ -42,6 +42,14 @@ class Reach(NamedTuple):
     magnitude: Floats | None = None
     gradient_radius: Floats | None = None
 
+    def take(self, at: Indices) -> "Reach":
+        """Return some of them."""
+        more = (
+            None if one is None else np.take(one, at, axis=-1)
+            for one in (self.gradient, self.magnitude, self.gradient_radius)
+        )
+        return Reach(*(np.take(one, at, axis=-1) for one in self[:4]), *more)
+
 
 @dataclass(frozen=True, eq=False)
 class Finder:
@@ -67,6 +75,12 @@ class Finder:
         return np.ascontiguousarray(self.textures.table.texels[0].T.astype(np.float64))
 
     @cached_property
+    def padded(self) -> tuple[Floats, Floats]:
+        """Entries (4, size + 2) with the outer ones twice, and the steps from each to the next."""
+        entries = np.pad(self.entries, ((0, 0), (1, 1)), mode="edge")
+        return entries, np.diff(entries, axis=1, append=entries[:, -1:])
+
+    @cached_property
     def ranges(self) -> tuple[Floats, Floats]:
         """Least and greatest entries (levels, 4, size) of runs of 2^level entries from each on."""
         lows, highs = [self.entries], [self.entries]
@@ -84,9 +98,13 @@ def classified(finder: Finder, value: Floats, radius: Floats, work: Workspace) -
     switches, table = finder.textures.pipeline.table, finder.textures.table
     size = table.sizes[0]
     off = radius + 2 * finder.slack.values + (finder.slack.weight / size if table.filter == "linear" else 0.0)
-    half = np.full(len(value), 0.5)
-    places = [table_place(switches, value.astype(np.float64) + side * off) for side in (-1, 1)]
-    ends = np.stack([fetch(table, (place, half), work) for place in places])
+    wide = value.astype(np.float64, copy=False)
+    places = [table_place(switches, wide - off), table_place(switches, wide + off)]
+    if table.filter == "linear" and table.weight_bits is None:
+        ends = _between_entries(finder, places)
+    else:
+        half = np.full(len(value), 0.5)
+        ends = np.stack([fetch(table, (place, half), work) for place in places])
     largest = np.maximum(np.abs(ends[0]), np.abs(ends[1]))
     spread = ROUNDINGS * finder.slack.values * largest
     if finder.srgb:
@@ -103,6 +121,28 @@ def classified(finder: Finder, value: Floats, radius: Floats, work: Workspace) -
         bounds = first[crossed], last[crossed], low[crossed], high[crossed]
         spread[:, crossed] += _beside(finder, bounds, ends[:, :, crossed], linear=table.filter == "linear")
     return ends, spread
+
+
+def _between_entries(finder: Finder, places: list[Floats]) -> Floats:
+    """Return a linear table's colours (2, 4, n) at two places each, the first not after the second.
+
+    Most pairs lie between the same two entries, which are then fetched once.
+    """
+    entries, steps = finder.padded
+    size = finder.entries.shape[1]
+    low, high = (np.clip(place, 0.0, 1.0) * size + 0.5 for place in places)
+    cell = low.astype(np.intp)
+    first, second = low - cell, high - cell
+    base, step = np.take(entries, cell, axis=1), np.take(steps, cell, axis=1)
+    ends = np.empty((2, *base.shape))
+    for weight, end in ((first, ends[0]), (second, ends[1])):
+        np.multiply(step, weight, out=end)
+        end += base
+    further = np.flatnonzero(second > 1)
+    if len(further):
+        at = high[further].astype(np.intp)
+        ends[1][:, further] = entries[:, at] + steps[:, at] * (high[further] - at)
+    return ends
 
 
 def _beside(

@@ -25,6 +25,10 @@ class Share(NamedTuple):
     opacity_off: Floats
     color_off: Floats
 
+    def part(self, some: slice) -> "Share":
+        """Return those of some samples."""
+        return Share(*(one[..., some] for one in self))
+
 
 def share_of(course: Course, reach: Reach, ray: Indices, part: Pair | None) -> Share:
     """Return what samples of rays `ray` (n,) that stand for `part` of a whole step may add."""

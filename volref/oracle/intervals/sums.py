@@ -10,22 +10,11 @@ from typing import NamedTuple
 import numpy as np
 
 from volref.arrays import Floats, Indices
-from volref.oracle.intervals import gradients
 from volref.oracle.intervals.compositing import CHUNK, Outcome
-from volref.oracle.intervals.finding import find
 from volref.oracle.intervals.gradients import Lit
-from volref.oracle.intervals.opacities import Share, share_of
-from volref.oracle.intervals.walking import (
-    Course,
-    Pair,
-    advanced,
-    begun,
-    ended_after,
-    ended_before,
-    met,
-    most_iterations,
-    place_of,
-)
+from volref.oracle.intervals.iterations import iterations
+from volref.oracle.intervals.opacities import Share
+from volref.oracle.intervals.walking import Course, Pair, Test, most_iterations, opaque
 from volref.workspace import Workspace
 
 
@@ -66,43 +55,28 @@ def _run(
     meeting: Meeting | None,
     work: Workspace,
 ) -> None:
-    walk = begun(course, ray)
-    zero = np.zeros(len(ray))
-    channels = len(result[0]) - 1
-    total = Sum(np.zeros((channels, len(ray))), np.zeros((channels, len(ray))), Pair(zero, zero))
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        for number in range(most_iterations(course)):
-            before = ended_before(course, walk, number)
-            _put_down(course, result, walk.ray, total, np.flatnonzero(before.maybe), number)
-            hit = met(course, walk)
-            over = before.sure
-            if hit is not None:
-                at = np.flatnonzero(hit.maybe & ~before.sure)
-                _put_down(course, result, walk.ray, total, at, number, meeting)
-                over = over | hit.sure
-            if over.any():
-                kept = np.flatnonzero(~over)
-                walk.take(kept)
-                total = total.take(kept)
-            if not len(walk.ray):
-                return
-            position, radius, part = place_of(course, walk, number)
-            reach = find(course.finder, position, radius, work)
-            if lit is not None:
-                reach = gradients.shaded(lit, course.finder, position, reach, walk.ray, radius)
-            total = _added(course, total, share_of(course, reach, walk.ray, part))
-            sampled = walk.position
-            advanced(course, walk)
-            after = ended_after(course, walk, sampled, total.alpha)
-            _put_down(course, result, walk.ray, total, np.flatnonzero(after.maybe), number + 1)
-            if after.sure.any():
-                kept = np.flatnonzero(~after.sure)
-                walk.take(kept)
-                total = total.take(kept)
-            if not len(walk.ray):
-                return
-    last = np.arange(len(walk.ray))
-    _put_down(course, result, walk.ray, total, last, most_iterations(course))
+    count, channels = len(ray), len(result[0]) - 1
+    total = Sum(
+        np.zeros((channels, count)), np.zeros((channels, count)), Pair(np.zeros(count), np.zeros(count))
+    )
+    gone, threshold = np.zeros(count, np.bool_), course.drawing.pipeline.stepping.opaque_at
+    with np.errstate(invalid="ignore", over="ignore"):
+        for number, one in enumerate(iterations(course, lit, ray, gone, work)):
+            left = ~gone[one.at]
+            _put_down(course, result, ray, total, one.at[one.before.maybe & left], number)
+            going = left & ~one.before.sure
+            if one.hit is not None:
+                _put_down(course, result, ray, total, one.at[one.hit.maybe & going], number, meeting)
+                going &= ~one.hit.sure
+            _add(course, total, one.share, one.at[one.some])
+            after = one.after
+            if threshold is not None:
+                full = opaque(course, total.alpha.take(one.at), threshold)
+                after = Test(after.sure | full.sure, after.maybe | full.maybe)
+            _put_down(course, result, ray, total, one.at[after.maybe & going], number + 1)
+            gone[one.at] |= ~going | after.sure
+    last = np.flatnonzero(~gone)
+    _put_down(course, result, ray, total, last, most_iterations(course))
 
 
 def _put_down(
@@ -127,6 +101,16 @@ def _put_down(
     result[0][:, here] = np.minimum(result[0][:, here], low)
     result[1][:, here] = np.maximum(result[1][:, here], high)
     result[2][here] += 1
+
+
+def _add(course: Course, total: Sum, share: Share, at: Indices) -> None:
+    """Add samples to the sums of rays, in place."""
+    if not len(at):
+        return
+    before = total.take(at)
+    grown = _added(course, before, share)
+    total.low[:, at], total.high[:, at] = grown.low, grown.high
+    total.alpha.low[at], total.alpha.high[at] = grown.alpha
 
 
 def _added(course: Course, total: Sum, share: Share) -> Sum:

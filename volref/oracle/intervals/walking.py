@@ -57,6 +57,7 @@ class Walk:
 
     ray: Indices
     position: Pair
+    delta: Pair
     walked: Pair
     depth: Pair
     offset: Pair
@@ -64,7 +65,7 @@ class Walk:
     def take(self, at: Indices) -> None:
         """Keep some of the rays."""
         self.ray = self.ray[at]
-        for name in ("position", "walked", "depth", "offset"):
+        for name in ("position", "delta", "walked", "depth", "offset"):
             setattr(self, name, getattr(self, name).take(at))
 
 
@@ -101,7 +102,8 @@ def begun(course: Course, ray: Indices) -> Walk:
     depth = walked
     if course.rays.cut is not None and course.rays.cut_off is not None:
         depth = around(course.rays.cut.depth[ray], course.rays.cut_off.depth[ray])
-    return Walk(ray, position, walked, depth, offset)
+    delta = around(paths.delta, np.broadcast_to(walks.delta_off[ray], paths.delta.shape))
+    return Walk(ray, position, delta, walked, depth, offset)
 
 
 def place_of(course: Course, walk: Walk, number: int) -> tuple[Floats, Floats, Pair | None]:
@@ -158,9 +160,7 @@ def advanced(course: Course, walk: Walk) -> None:
     stepping, walks, ray = course.drawing.pipeline.stepping, course.walks, walk.ray
     paths = walks.paths
     if stepping.advance == "add":
-        off = walks.delta_off[ray]
-        delta = paths.delta[:, ray]
-        walk.position = walk.position.plus(around(delta, np.broadcast_to(off, delta.shape)))
+        walk.position = walk.position.plus(walk.delta)
     counted = (
         stepping.end == "length-left" or stepping.end == "length-after" or stepping.advance == "parameter"
     )
@@ -194,30 +194,22 @@ def ended_before(course: Course, walk: Walk, number: int) -> Test:
     return Test(nowhere, nowhere)
 
 
-def ended_after(course: Course, walk: Walk, sampled: Pair, alpha: Pair) -> Test:
-    """Tell which rays end after a sample, whose position was `sampled`, with an alpha between those."""
-    stepping = course.drawing.pipeline.stepping
-    own = _own_end_after(course, walk, sampled)
-    if stepping.opaque_at is None:
-        return own
-    opaque = _opaque(course, alpha, stepping.opaque_at)
-    return Test(own.sure | opaque.sure, own.maybe | opaque.maybe)
-
-
-def _own_end_after(course: Course, walk: Walk, sampled: Pair) -> Test:
+def own_end_after(course: Course, walk: Walk, sampled: Pair) -> Test:
+    """Tell which rays end after a sample at `sampled` by where they are, or by how far they have gone."""
     end, ray, (low, high) = course.drawing.pipeline.stepping.end, walk.ray, walk.position
     if end == "length-after":
         length, off = course.walks.paths.length[ray], course.walks.length_off[ray]
-        return Test(walk.walked.low >= length + off, walk.walked.high >= length - off)
+        return Test(np.asarray(walk.walked.low >= length + off), np.asarray(walk.walked.high >= length - off))
     if end == "outside":
-        return Test(((low > 1) | (high < 0)).any(axis=0), ((high > 1) | (low < 0)).any(axis=0))
+        sure, maybe = (low > 1) | (high < 0), (high > 1) | (low < 0)
+        return Test(np.any(sure, axis=0), np.any(maybe, axis=0))
     if end == "outside-above":
-        return Test((sampled.low > 1).any(axis=0), (sampled.high > 1).any(axis=0))
+        return Test(np.any(sampled.low > 1, axis=0), np.any(sampled.high > 1, axis=0))
     nowhere = np.zeros(len(ray), np.bool_)
     return Test(nowhere, nowhere)
 
 
-def _opaque(course: Course, alpha: Pair, threshold: float) -> Test:
+def opaque(course: Course, alpha: Pair, threshold: float) -> Test:
     """Tell which rays are opaque, by an alpha that some roundings may have moved."""
     off = 64 * course.finder.slack.values
     above = course.drawing.pipeline.stepping.opaque_test == "above"
