@@ -7,7 +7,12 @@ one of the table before the later one.
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from volref.oracle.faults.fault import Fault
+from volref.oracle.faults.table import FAULTS
+
+PLACES = {key: place for place, key in enumerate(FAULTS)}
 
 # What one more number is worth: a fitted strength, and five times that a second fault.
 FITTED_COST, FAULT_COST = 0.005, 0.025
@@ -56,4 +61,9 @@ def ranked(findings: list[Finding]) -> list[Finding]:
     for one in findings:
         if one.key not in best or one.belief > best[one.key].belief:
             best[one.key] = one
-    return sorted(best.values(), key=lambda one: -round(one.belief / FITTED_COST))
+    return sorted(best.values(), key=_order)
+
+
+def _order(one: Finding) -> tuple[float, list[int]]:
+    level = -round(one.belief / FITTED_COST) if np.isfinite(one.belief) else np.inf
+    return level, [PLACES[part.fault.key] for part in one.parts]

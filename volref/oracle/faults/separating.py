@@ -25,7 +25,7 @@ SEPARATING = MappingProxyType(
         "T2": "opaque-border",
         "T3": "long-rays",
         "T4": "thin-slab",
-        "J1": "thin-slab",
+        "J1": "lit-sphere",
         "L1": "two-entries",
         "L2": "spike",
         "L3": "checkers",

@@ -84,7 +84,9 @@ def _other_step(subject: Subject, ratio: float) -> Subject:
 
 
 def _biased(subject: Subject, mean: float) -> Subject:
-    """Return a subject whose samples lie at another mean place in their steps."""
+    """Return a subject whose samples lie at another mean place in their steps; at 0 jitter is none at all."""
+    if subject.jitter is not None and mean == 0:
+        return subject
     if subject.jitter is not None:
         return dataclasses.replace(subject, jitter=np.clip(2 * mean * subject.jitter, 0.0, 1.0))
     if subject.pipeline.stepping.jitter or subject.pipeline.stepping.offset == mean:
@@ -166,14 +168,14 @@ STEPPING = (
         "T4-step",
         "steps have another length than their opacity is meant for",
         _other_step,
-        strengths=(0.5, 2.0),
+        strengths=(0.5, 0.8, 1.25, 2.0),
         fitted=True,
     ),
     fault(
         "J1-biased-jitter",
         "samples lie at another place in their steps",
         _biased,
-        strengths=(0.0, 0.25, 0.5, 0.75, 1.0),
+        strengths=(0.0, 0.5, 1.0),
         fitted=True,
     ),
     fault("J1-wood-grain", "all rays start in step, without their jitter", _in_step),
