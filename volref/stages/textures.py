@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from volref.arrays import Floats, Indices, Numbers
+from volref.arrays import Floats, Numbers
 from volref.workspace import Workspace
 
 FILTERS = ("nearest", "linear")
@@ -98,19 +98,9 @@ def fetch(texture: Texture, coordinates: Sequence[Floats] | Floats, work: Worksp
     >>> fetch(ramp, np.array([[0.0, 0.25, 0.5, 2.0], [0.5] * 4]), Workspace()).tolist()
     [[0.0, 0.0, 0.5, 1.0]]
     """
-    return fetch_with_cell(texture, coordinates, work)[0]
-
-
-def fetch_with_cell(
-    texture: Texture, coordinates: Sequence[Floats] | Floats, work: Workspace
-) -> tuple[Floats, Indices]:
-    """Return the same, and the flat index (n,) of the cell of each point among texels padded by `PAD`.
-
-    The index is a buffer of `work`: the next fetch overwrites it.
-    """
     n = len(coordinates[0])
     result = np.empty((len(texture.corners), n), texture.texels.dtype)
-    index, weights = _cells(texture, coordinates, work)
+    index, weights = cells_of(texture, coordinates, work)
     for corners, out in zip(texture.corners, result, strict=True):
         if texture.result_bits is None:
             _interpolate(corners, index, weights, out, work)
@@ -118,7 +108,7 @@ def fetch_with_cell(
             codes = work.get("codes", n, np.int32)
             _interpolate_codes(corners, index, weights, codes, texture.weight_bits or 0, work)
             _decode(codes, texture.result_bits, out)
-    return result, index
+    return result
 
 
 def fetch_slices(
@@ -147,7 +137,7 @@ def footprint(texture: Texture, coordinates: Sequence[Floats] | Floats) -> Footp
     >>> found.texel.tolist(), found.weight.tolist(), found.value.tolist()
     ([[[0, 0], [1, 0]]], [[0.75, 0.25]], [[[0.0], [1.0]]])
     """
-    index, weights = _cells(texture, coordinates, Workspace())
+    index, weights = cells_of(texture, coordinates, Workspace())
     shares = iter([w / 2.0 ** (texture.weight_bits or 0) if w.dtype.kind == "i" else w for w in weights])
     axes = []
     for size, stride in zip(texture.sizes, texture.strides, strict=True):
@@ -171,10 +161,12 @@ def _neighbors(
     return [(place % size if wrap else np.clip(place, 0, size - 1), part) for place, part in sides]
 
 
-def _cells(
+def cells_of(
     texture: Texture, coordinates: Sequence[Floats] | Floats, work: Workspace
 ) -> tuple[Numbers, list[Numbers]]:
     """Return the flat index (n,) of each point's lowest texel, and weights (n,) of the next along each axis.
+
+    The index counts texels padded by `PAD`.  All are buffers of `work`: the next fetch overwrites them.
 
     Axes of one texel are left out, and a nearest fetch has no weights.  Weights are in the type of the
     texels, or, where results are rounded, whole numbers 0..2^weight_bits - 1.
@@ -249,7 +241,7 @@ def _interpolate(
     corners: tuple[Numbers, ...], index: Numbers, weights: list[Numbers], out: Floats, work: Workspace
 ) -> None:
     """Write to `out` the interpolation of the 2^k corners found at `index` by k weights."""
-    found = _found(corners[: 2 ** len(weights)], index, out, work)
+    found = texels_of(corners[: 2 ** len(weights)], index, out, work)
     for weight in weights:
         for low, high in zip(found[::2], found[1::2], strict=True):
             np.subtract(high, low, out=high)
@@ -268,7 +260,7 @@ def _interpolate_codes(
 ) -> None:
     """Write to `out` the codes interpolated from codes: a + (f (b - a) + half >> bits) each time."""
     half = np.int32(1 << bits >> 1)
-    found = _found(corners[: 2 ** len(weights)], index, out, work)
+    found = texels_of(corners[: 2 ** len(weights)], index, out, work)
     for weight in weights:
         for low, high in zip(found[::2], found[1::2], strict=True):
             np.subtract(high, low, out=high)
@@ -279,7 +271,7 @@ def _interpolate_codes(
         found = found[::2]
 
 
-def _found(corners: tuple[Numbers, ...], index: Numbers, out: Numbers, work: Workspace) -> list[Numbers]:
+def texels_of(corners: tuple[Numbers, ...], index: Numbers, out: Numbers, work: Workspace) -> list[Numbers]:
     """Return the texels of corners, those of the first in `out`."""
     found = [out, *(work.get(f"corner {k}", len(index), out.dtype) for k in range(1, len(corners)))]
     for corner, texel in zip(corners, found, strict=True):
