@@ -29,12 +29,15 @@ def why(ranking, message, counterfactual, verdict, status="explained"):
 
 
 def canvas(height=20, width=24):
-    """Codes of a premultiplied canvas: a ball of slowly changing colour on nothing."""
+    """Codes of a premultiplied canvas: a ball of slowly changing colour on nothing, and a last pixel."""
     y, x = np.mgrid[0:height, 0:width]
     radius = np.hypot((x - 0.5 * width) / width, (y - 0.45 * height) / height)
     alpha = np.clip(1.6 * (0.45 - radius), 0, 1)
     color = np.stack([0.2 + 0.7 * x / width, 0.9 - 0.6 * y / height, 0.5 + 0.4 * np.sin(x / 5)], axis=-1)
-    return np.rint(255 * np.concatenate([color * alpha[..., None], alpha[..., None]], axis=-1)).astype(int)
+    codes = np.rint(255 * np.concatenate([color * alpha[..., None], alpha[..., None]], axis=-1)).astype(int)
+    # Not clear: where the numbers of one channel end and those of the next begin, they differ.
+    codes[-1, -1] = 30, 20, 10, 60
+    return codes
 
 
 def intervals(codes, spread=1, **fields):

@@ -9,7 +9,7 @@ from volref.oracle.acceptance import Acceptance
 from volref.oracle.explanation import Explanation
 from volref.oracle.faults.fault import Subject
 from volref.oracle.verdict import Verdict
-from volref.planning import plan
+from volref.planning import Plan, plan
 from volref.report.figures import KINDS, levels
 from volref.report.verdicts.cases import Case
 from volref.truth.result import Render
@@ -43,15 +43,23 @@ def case_of(
     if subject is not None:
         parts = subject.scene, subject.pipeline, subject.device, subject.jitter, subject.frames
         passes = dict(emulate(*parts).passes)
-        known["plan of the truth"] = str(plan(subject.scene))
+        known["plan of the truth"] = plan_words(plan(subject.scene))
     if truth is not None:
-        known["plan of the truth"] = str(truth.plan)
+        known["plan of the truth"] = plan_words(truth.plan)
         known["error of the truth"] = (
             "unknown"
             if truth.bound_kind == "none"
             else f"at most {levels(truth.bound.max())}/255 ({KINDS[truth.bound_kind][0]})"
         )
     return Case(name, acceptance, verdict, explanation, passes, known)
+
+
+def plan_words(chosen: Plan) -> str:
+    """Return a plan with a line for each stage."""
+    lines = [
+        f"{stage.name}{'' if stage.included else ', left out'}: {stage.reason}" for stage in chosen.stages
+    ]
+    return "\n".join([f"method {chosen.method}", *lines])
 
 
 def digest_of_file(path: str | Path) -> str:

@@ -97,7 +97,7 @@ def _figure(case: Case, name: str, codes: Bytes, about: str) -> str:
 
 
 def _ranking(ranking: Sequence[Ranked]) -> str:
-    seen = ranking[:MOST_OF_A_RANKING]
+    seen = [one for one in ranking[:MOST_OF_A_RANKING] if one.explained > 0] or ranking[:1]
     rows = "".join(
         f'<tr><th scope="row">{escape(one.fault)}</th><td>{escape(title_of(one.fault))}</td>'
         f"<td>{escape(_strength(one.strength))}</td>"
@@ -108,7 +108,8 @@ def _ranking(ranking: Sequence[Ranked]) -> str:
     head = "".join(f'<th scope="col">{name}</th>' for name in names)
     table = scrolling("Faults", f"<table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>")
     rest = len(ranking) - len(seen)
-    return table + paragraph(f"{rest} more explain no more than that." if rest else "")
+    said = f"{rest} other fault{'s' * (rest > 1)} tried: less than these, or nothing." if rest else ""
+    return table + paragraph(said)
 
 
 def _strength(strength: float | tuple[float, ...]) -> str:
