@@ -59,13 +59,13 @@ export function canvasAlpha({ accumulation, output }) {
 }
 
 /**
- * Return what gives the interval of a pixel in the numbers of the candidate, 3 or 4 channels.
+ * Return what writes the interval of a pixel, in the numbers of the candidate, into two arrays of four.
  *
  * @param {import("./volref-bundle.js").Bundle} bundle
  * @param {import("./volref-bundle.js").Interval} interval
  * @param {Candidate} candidate
  * @param {Delivery} delivery
- * @returns {(pixel: number) => [number[], number[]]}
+ * @returns {[(pixel: number, lo: Float64Array, hi: Float64Array) => void, 3|4]}  and how many channels it has
  */
 export function delivered({ manifest: { pipeline } }, interval, candidate, delivery) {
   const own = canvasAlpha(pipeline);
@@ -75,24 +75,25 @@ export function delivered({ manifest: { pipeline } }, interval, candidate, deliv
   const between = encodedKind(delivery, own);
   const converted = delivery.encoding !== "none" || ![own, "ignored"].includes(delivery.alpha);
   const share = ROUNDING + (converted ? CONVERSION_ROUNDING : 0);
+  const ignored = delivery.alpha === "ignored";
+  const channels = ignored ? 3 : 4;
+  const alphas = new Float64Array(2);
 
-  return (pixel) => {
-    const lo = Array.from(interval.lo.subarray(4 * pixel, 4 * pixel + 4), (low) => low - widened);
-    const hi = Array.from(interval.hi.subarray(4 * pixel, 4 * pixel + 4), (high) => high + widened);
-    let colors = lo.slice(0, 3).map((low, channel) => [low, hi[channel]]);
-    if (delivery.alpha === "ignored") {
-      colors = colors.map((ends) => encoded(ends, delivery.encoding));
-    } else {
-      const alphas = alphaRange(lo[3], hi[3], unitOf(candidate, pixel, 3), candidate.levels, exact);
-      colors = colors
-        .map((ends) => asKind(ends, alphas, own, between))
-        .map((ends) => encoded(ends, delivery.encoding))
-        .map((ends) => asKind(ends, alphas, between, delivery.alpha));
-      colors.push([lo[3], hi[3]]);
+  // One pixel after the other, in arrays that are there: an image has a million numbers.
+  const write = (pixel, lo, hi) => {
+    for (let channel = 0; channel < channels; channel += 1) {
+      lo[channel] = interval.lo[4 * pixel + channel] - widened;
+      hi[channel] = interval.hi[4 * pixel + channel] + widened;
     }
-    const ends = colors.map((pair) => stored(pair, candidate.levels, share));
-    return [ends.map(([low]) => low), ends.map(([, high]) => high)];
+    if (!ignored) alphaRange(alphas, lo[3], hi[3], unitOf(candidate, pixel, 3), candidate.levels, exact);
+    for (let channel = 0; channel < 3 && converted; channel += 1) {
+      if (!ignored) asKind(lo, hi, channel, alphas, own, between);
+      encodeEnds(lo, hi, channel, delivery.encoding);
+      if (!ignored) asKind(lo, hi, channel, alphas, between, delivery.alpha);
+    }
+    for (let channel = 0; channel < channels; channel += 1) store(lo, hi, channel, candidate.levels, share);
   };
+  return [write, channels];
 }
 
 function canvasLevels({ output }) {
@@ -107,8 +108,10 @@ function unitOf({ data, channels, levels }, pixel, channel) {
 function onLevels(candidate, delivery, own, levels) {
   if (candidate.levels !== null) return true;
   const slack = levels * (ROUNDING + 2 * CONVERSION_ROUNDING);
+  const numbers = new Float64Array(delivery.alpha === "ignored" ? 3 : 4);
   for (let pixel = 0; pixel < candidate.width * candidate.height; pixel += 1) {
-    for (const number of canvasNumbers(candidate, pixel, delivery, own)) {
+    writeCanvas(numbers, candidate, pixel, delivery, own);
+    for (const number of numbers) {
       const code = levels * number;
       if (Math.abs(code - Math.round(code)) > slack) return false;
     }
@@ -122,54 +125,67 @@ function encodedKind({ alpha, encoding }, own) {
   return DIRECT.includes(encoding) ? own : "straight";
 }
 
-/** The numbers on the canvas that a pixel comes from, as nearly as it tells them. */
-function canvasNumbers(candidate, pixel, delivery, own) {
-  const { alpha, encoding } = delivery;
-  let colors = [0, 1, 2].map((channel) => unitOf(candidate, pixel, channel));
-  if (alpha === "ignored") return colors.map((color) => decode(color, encoding));
-  const share = unitOf(candidate, pixel, 3);
-  const change = (from, to) => {
-    if (from === to) return;
-    if (to === "premultiplied") colors = colors.map((color) => color * share);
-    else colors = colors.map((color) => (share > 0 ? color / share : 0));
-  };
-  const between = encodedKind(delivery, own);
-  change(alpha, between);
-  colors = colors.map((color) => decode(color, encoding));
-  change(between, own);
-  return [...colors, share];
-}
-
-/** Which alphas of the canvas the candidate's may come from. */
-function alphaRange(lo, hi, alpha, levels, exact) {
-  if (exact) return [alpha, alpha];
-  const slack = levels === null ? alpha * ROUNDING : 1 / levels;
-  const [least, most] = [Math.max(alpha - slack, 0), alpha + slack];
-  // An alpha that no canvas within the intervals has is found by its own channel.
-  return least <= hi && most >= lo ? [Math.max(least, lo), Math.min(most, hi)] : [least, most];
-}
-
-/** A colour's ends of one kind of alpha as the other; straight ones held to 1 or not: tools do either. */
-function asKind([lo, hi], [least, most], kind, wanted) {
-  if (kind === wanted) return [lo, hi];
-  if (wanted === "premultiplied") {
-    return [Math.min(lo * least, lo * most), Math.max(hi * least, hi * most)];
+/** Write the numbers on the canvas that a pixel comes from, as nearly as it tells them. */
+function writeCanvas(numbers, candidate, pixel, { alpha, encoding }, own) {
+  const share = numbers.length === 4 ? unitOf(candidate, pixel, 3) : 1;
+  const between = encodedKind({ alpha, encoding }, own);
+  for (let channel = 0; channel < 3; channel += 1) {
+    const color = unitOf(candidate, pixel, channel);
+    numbers[channel] =
+      alpha === "ignored"
+        ? decode(color, encoding)
+        : colorAs(decode(colorAs(color, share, alpha, between), encoding), share, between, own);
   }
-  if (least <= 0) return [0, FREE];
-  return [Math.min(lo / least, lo / most, 1), Math.max(hi / least, hi / most)];
+  if (numbers.length === 4) numbers[3] = share;
 }
 
-/** A colour's ends encoded, held to 1 before or not: tools do either. */
-function encoded([lo, hi], encoding) {
-  return encoding === "none" ? [lo, hi] : [encode(Math.min(lo, 1), encoding), encode(hi, encoding)];
+function colorAs(color, alpha, kind, wanted) {
+  if (kind === wanted) return color;
+  if (wanted === "premultiplied") return color * alpha;
+  return alpha > 0 ? color / alpha : 0;
 }
 
-/** Ends in the candidate's numbers, outward by as much as storing them may round. */
-function stored([lo, hi], levels, share) {
-  if (levels === null) return [lo - share * Math.abs(lo), hi + share * Math.abs(hi)];
-  const slack = levels * OWN_ROUNDING;
-  const [low, high] = [lo, hi].map((end) => Math.min(Math.max(end, 0), 1) * levels);
-  return [Math.floor(low + slack), Math.ceil(high - slack)];
+/** Write which alphas of the canvas the candidate's may come from. */
+function alphaRange(alphas, lo, hi, alpha, levels, exact) {
+  const slack = exact ? 0 : levels === null ? alpha * ROUNDING : 1 / levels;
+  alphas[0] = exact ? alpha : Math.max(alpha - slack, 0);
+  alphas[1] = alpha + slack;
+  // An alpha that no canvas within the intervals has is found by its own channel.
+  if (exact || !(alphas[0] <= hi && alphas[1] >= lo)) return;
+  alphas[0] = Math.max(alphas[0], lo);
+  alphas[1] = Math.min(alphas[1], hi);
+}
+
+/** Change ends of a colour to the other kind of alpha; straight ones held to 1 or not: tools do either. */
+function asKind(lo, hi, channel, [least, most], kind, wanted) {
+  if (kind === wanted) return;
+  const [low, high] = [lo[channel], hi[channel]];
+  if (wanted === "premultiplied") {
+    lo[channel] = Math.min(low * least, low * most);
+    hi[channel] = Math.max(high * least, high * most);
+  } else {
+    lo[channel] = least <= 0 ? 0 : Math.min(low / least, low / most, 1);
+    hi[channel] = least <= 0 ? FREE : Math.max(high / least, high / most);
+  }
+}
+
+/** Encode a colour's ends, held to 1 before or not: tools do either. */
+function encodeEnds(lo, hi, channel, encoding) {
+  if (encoding === "none") return;
+  lo[channel] = encode(Math.min(lo[channel], 1), encoding);
+  hi[channel] = encode(hi[channel], encoding);
+}
+
+/** Change ends to the candidate's numbers, outward by as much as storing them may round. */
+function store(lo, hi, channel, levels, share) {
+  if (levels === null) {
+    lo[channel] -= share * Math.abs(lo[channel]);
+    hi[channel] += share * Math.abs(hi[channel]);
+  } else {
+    const slack = levels * OWN_ROUNDING;
+    lo[channel] = Math.floor(Math.min(Math.max(lo[channel], 0), 1) * levels + slack);
+    hi[channel] = Math.ceil(Math.min(Math.max(hi[channel], 0), 1) * levels - slack);
+  }
 }
 
 function oneOf(name, word, words) {

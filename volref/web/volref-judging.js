@@ -35,30 +35,25 @@ const CHANNELS = ["red", "green", "blue", "alpha"];
  */
 export function judged(candidate, bundle, interval, delivery, leftOut, most = Infinity) {
   const { width, data, channels, levels } = candidate;
-  const intervalOf = delivered(bundle, interval, candidate, delivery);
+  const [writeInterval, judgedChannels] = delivered(bundle, interval, candidate, delivery);
+  const [lo, hi] = [new Float64Array(4), new Float64Array(4)];
   const scale = 1 / (levels ?? 1);
   const excess = new Float64Array(leftOut.length);
   let [count, worst] = [0, null];
-  for (let pixel = 0; pixel < leftOut.length; pixel += 1) {
+  for (let pixel = 0; pixel < leftOut.length && count < most; pixel += 1) {
     if (leftOut[pixel]) continue;
-    const [lo, hi] = intervalOf(pixel);
-    for (let channel = 0; channel < lo.length; channel += 1) {
+    writeInterval(pixel, lo, hi);
+    for (let channel = 0; channel < judgedChannels; channel += 1) {
       const number = data[channels * pixel + channel];
       const beyond = beyondOf(number, lo[channel], hi[channel]) / (levels ?? 1);
-      excess[pixel] = Math.max(excess[pixel], beyond);
+      if (beyond > excess[pixel]) excess[pixel] = beyond;
       if (beyond > (worst?.excess ?? 0)) {
         const place = { x: pixel % width, y: Math.floor(pixel / width), channel: CHANNELS[channel] };
-        worst = {
-          ...place,
-          value: number * scale,
-          lo: lo[channel] * scale,
-          hi: hi[channel] * scale,
-          excess: beyond,
-        };
+        const ends = { lo: lo[channel] * scale, hi: hi[channel] * scale };
+        worst = { ...place, value: number * scale, ...ends, excess: beyond };
       }
     }
-    count += excess[pixel] > 0 ? 1 : 0;
-    if (count >= most) break;
+    if (excess[pixel] > 0) count += 1;
   }
   return { count, excess, worst };
 }
