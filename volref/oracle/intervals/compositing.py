@@ -146,7 +146,8 @@ def _or_else(here: Results, other: Pair, at: Indices, maybe: Booleans, sure: Boo
 
 def _in_front(share: Share, here: Results, ray: Indices) -> None:
     """Put samples in front of the results of rays, in place."""
-    if share.opacity.max() > 1:
+    # The last row is alpha.  Where one is above 1, more in front makes less of what is behind.
+    if max(share.opacity.max(), here[1][-1].max()) > 1:
         _in_front_of_more(share, here, ray)
         return
     every = len(ray) == here[0].shape[1]
