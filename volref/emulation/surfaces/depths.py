@@ -35,14 +35,14 @@ def mesh_targets(
     kind = pipeline.meshes.kind
     if kind == "depth":
         back = faces(scene, box, device, "front")
-        mesh_nearness = _nearness(
+        mesh_nearness = nearness_of(
             scene, pipeline, device, surfaces.window_z, surfaces.inverse_w, surfaces.view
         )
         targets = {
             "mesh_depth": _depth_target(scene, pipeline, device, surfaces.pixel, mesh_nearness),
             "mesh_color": _color_target(scene, pipeline, device, surfaces),
             "back_depth": _depth_target(
-                scene, pipeline, device, back.pixel, _face_nearness(scene, pipeline, box, device, back)
+                scene, pipeline, device, back.pixel, face_nearness(scene, pipeline, box, device, back)
             ),
         }
     elif kind == "distance" and len(scene.meshes):
@@ -76,7 +76,7 @@ def cut_rays(
     )
     kind, switches = device.control_type, pipeline.meshes
     near = np.zeros(pixels, kind)
-    near[front.pixel] = _face_nearness(scene, pipeline, box, device, front)
+    near[front.pixel] = face_nearness(scene, pipeline, box, device, front)
     surface, back = (
         kind(1) - unpacked(targets[name][ends.pixel], switches.packing)
         for name in ("mesh_depth", "back_depth")
@@ -100,13 +100,13 @@ def _measured(scene: Scene, pipeline: Pipeline, surfaces: Surfaces) -> Floats:
     return np.asarray(found * pipeline.meshes.scale)
 
 
-def _face_nearness(scene: Scene, pipeline: Pipeline, box: Box, device: Device, face: Fragments) -> Floats:
+def face_nearness(scene: Scene, pipeline: Pipeline, box: Box, device: Device, face: Fragments) -> Floats:
     """Return the nearness (F,) of fragments of the box's faces."""
     view = transform_points(scene.camera.view_from_world @ box.world_from_texture, face.varyings.T).T
-    return _nearness(scene, pipeline, device, face.window_z, face.inverse_w, view)
+    return nearness_of(scene, pipeline, device, face.window_z, face.inverse_w, view)
 
 
-def _nearness(
+def nearness_of(
     scene: Scene, pipeline: Pipeline, device: Device, window_z: Floats, inverse_w: Floats, view: Floats
 ) -> Floats:
     """Return 1 - depth (F,) in the control type: gl_FragCoord.z gl_FragCoord.w, or linear in the distance."""

@@ -12,10 +12,10 @@ import numpy as np
 
 from volref.arrays import Booleans, Floats, Indices
 from volref.emulation.drawing import Approach, Drawing, approach
-from volref.emulation.loop.marching import Cut
 from volref.emulation.rays.box import box_of
 from volref.emulation.rays.paths import Ends
 from volref.emulation.surfaces.meshes import NOWHERE
+from volref.oracle.intervals.depths import cut_error
 from volref.oracle.intervals.faces import byte_variants, shifted, varying_error, window_error
 from volref.oracle.intervals.rays import Rays, merged
 from volref.oracle.intervals.slabs import Lines, cuts_of, lines_of
@@ -131,7 +131,7 @@ def _face_rays(drawing: Drawing, one: Approach, slack: Slack, *, bytes_too: bool
     if one.cut is not None:
         behind = one.targets["mesh_color"].reshape(-1, 4)[ends.pixel].astype(np.float64)
         covered = behind[:, 3] > 0
-        cut_off = _cut_error(drawing, one, off, slack)
+        cut_off = cut_error(drawing, one, off, slack)
     path_off = np.maximum(entry_off, exit_off) if ends.along is None else entry_off
     rays = Rays(ends, entry_off, exit_off, along_off, path_off, behind, covered, one.cut, cut_off)
     if setup.kind == "coordinates" and setup.format == "unorm8" and unit and bytes_too:
@@ -151,23 +151,3 @@ def _distance_to_eye(drawing: Drawing, ends: Ends) -> Floats:
     assert ends.along is not None
     with np.errstate(divide="ignore"):
         return np.asarray((np.where(ends.along > 0, 1 - eye, eye) / np.abs(ends.along)).min(axis=0))
-
-
-def _cut_error(drawing: Drawing, one: Approach, off: Floats, slack: Slack) -> Cut:
-    """Return how far the depths of rays may be off: by their varyings, and by their packing into bytes."""
-    assert one.cut is not None
-    scene, unit = drawing.scene, slack.control
-    near, far = scene.camera.near, scene.camera.far
-    if drawing.pipeline.meshes.depth == "linear":
-        reach = np.linalg.norm(drawing.box.sides)
-        depth = 8 * unit * (1 + (far + reach) / (far - near)) + off * reach / (far - near)
-    else:
-        depth = 16 * unit + off * 0
-    stored = depth + 2.0**-23
-    if drawing.pipeline.meshes.packing == "printed":
-        # Digits k / 256 are kept as 255ths: near a change of the first one the sum jumps by 1 / 256 / 255.
-        stored = stored + 2 / 256 / 255
-    there = one.targets["mesh_depth"].reshape(scene.width * scene.height, -1)[one.ends.pixel].any(axis=1)
-    surface = np.where(there, stored, 0.0)
-    steps = drawing.pipeline.stepping.steps
-    return Cut(depth, (depth + stored) / steps + 4 * unit * np.abs(one.cut.step), surface, one.cut.early)

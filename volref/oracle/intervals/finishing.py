@@ -72,12 +72,25 @@ def finished(
         for color in colors:
             done = tone_mapped(color, output, drawing.scene.background) if mapped else color
             outcomes.append(_blended(done, behind, output, device))
+    if output.blend == "straight":
+        outcomes.append(_least_straight(outcomes[0], fragments, behind, integer=device.blend == "integer"))
     stacked = np.array(outcomes)
     low, high = np.fmin.reduce(stacked), np.fmax.reduce(stacked)
     off = 24 * slack.values * np.maximum(1.0, np.maximum(np.abs(low), np.abs(high)))
     if output.gamma != 1.0 or output.tone_map != "none":
         off = off + slack.power(1.0)
     return Pair(low - off, high + off)
+
+
+def _least_straight(outcome: Floats, fragments: Pair, behind: Floats, *, integer: bool) -> Floats:
+    """Return an outcome with the least alpha: a a + (1 - a) b is least at a = b / 2, inside what a may be."""
+    middle = behind[:, 3] / 2
+    inside = (fragments.low[:, 3] < middle) & (fragments.high[:, 3] > middle)
+    # Products of whole numbers are rounded one by one.
+    least = behind[:, 3] - middle * middle - 2 * STEP * integer
+    lowered = outcome.copy()
+    lowered[:, 3] = np.where(inside, least, outcome[:, 3])
+    return lowered
 
 
 def _corners(fragments: Pair, output: Output, slack: Slack) -> list[Floats]:

@@ -97,6 +97,8 @@ def begun(course: Course, ray: Indices) -> Walk:
         off = entry_off + (offset.high - offset.low) / 2 * step + walks.delta_off[ray] * offset.high
         off = off + np.where(off > 0, 4 * unit, 0.0)
         position = around(paths.entry + paths.delta * middle.astype(paths.delta.dtype), off)
+        if course.drawing.pipeline.rays.kind != "slab" and course.drawing.device.freedom == "rounded":
+            position = _on_faces(paths.entry, position)
     if stepping.end == "length-left":
         walked = around(paths.length, walks.length_off[ray])
     depth = walked
@@ -104,6 +106,16 @@ def begun(course: Course, ray: Indices) -> Walk:
         depth = around(course.rays.cut.depth[ray], course.rays.cut_off.depth[ray])
     delta = around(paths.delta, np.broadcast_to(walks.delta_off[ray], paths.delta.shape))
     return Walk(ray, position, delta, walked, depth, offset)
+
+
+def _on_faces(entry: Floats, position: Pair) -> Pair:
+    """Return positions (3, n) of fragments, of which those on a face at 1 are not beyond it, nor at 0.
+
+    A varying that is 1 at all corners is x / x, or x times the rounded 1 / x, which is never above 1.
+    """
+    low = np.where(entry == 0, entry, position.low)
+    high = np.where(entry == 1, entry, position.high)
+    return Pair(np.minimum(low, high), high)
 
 
 def place_of(course: Course, walk: Walk, number: int) -> tuple[Floats, Floats, Pair | None]:
