@@ -244,3 +244,26 @@ def test_start_offsets_keep_their_pattern_about_another_mean():
     found = FAULTS["J1-biased-jitter"].changed(one, 0.25).jitter
     assert np.allclose(found, one.jitter / 2, rtol=0, atol=1e-15)
     assert FAULTS["J1-wood-grain"].changed(one, 1.0).jitter is None
+
+
+@pytest.mark.parametrize(("letter", "place"), [("x", 0), ("y", 1), ("z", 2)])
+def test_a_volume_turned_round_has_its_first_voxel_at_the_other_end_of_that_axis(letter, place):
+    one = subject(BASELINE)
+    turned = FAULTS[f"G4-flip-{letter}"].changed(one, 1.0).scene.volume
+    index = np.array([2, 3, 4])
+    mirrored = index.copy()
+    mirrored[place] = turned.size[place] - 1 - index[place]
+    assert turned.values[tuple(mirrored[::-1])] == one.scene.volume.values[tuple(index[::-1])]
+
+
+@pytest.mark.parametrize(("pair", "axes"), [(1.0, (0, 1)), (2.0, (1, 2)), (3.0, (0, 2))])
+@pytest.mark.parametrize("centering", ["cell", "node"])
+def test_exchanged_axes_leave_the_box_where_it_is(pair, axes, centering):
+    plain = subjects.turned()
+    volume = plain.volume
+    placed = vr.Volume(volume.values, volume.spacing, (1, 2, 3), volume.direction, centering)
+    one = subject(BASELINE, dataclasses.replace(plain, volume=placed))
+    swapped = FAULTS["G4-swapped-axes"].changed(one, pair).scene.volume
+    assert np.allclose(swapped.corners, placed.corners, rtol=0, atol=1e-9)
+    assert swapped.size[axes[0]] == placed.size[axes[1]]
+    assert swapped.size[axes[1]] == placed.size[axes[0]]
