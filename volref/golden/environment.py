@@ -59,10 +59,11 @@ def _probe() -> Iterator[Numbers]:
     # Multiples of the golden ratio: evenly spread over 0..1, and the same everywhere.
     spread = np.arange(1, PROBES + 1) * 0.6180339887498949 % 1.0
     for kind in (np.float32, np.float64):
-        places = spread.astype(kind)
+        places: Numbers = spread.astype(kind)
         yield from (getattr(np, name)(places) for name in FUNCTIONS)
         yield from (np.power(places, kind(power)) for power in (0.37, 2.2, 5.0))
         yield np.arctan2(places, places[::-1])
-        square, points = places[:16].reshape(4, 4), places.reshape(-1, 4)
+        square: Numbers = places[:16].reshape(4, 4)
+        points: Numbers = places.reshape(-1, 4)
         yield from (square @ square, points @ square, points[:, :3] @ square[:3, :3], square @ square[0])
         yield from (np.linalg.inv(square), np.linalg.norm(points, axis=1))
