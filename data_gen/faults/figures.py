@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from volref.golden.confusion import Confusion, Told, never_apart, never_caught
+from volref.oracle.faults.table import FAULTS
 
 FORMAT, VERSION = "volref-faults", 1
 
@@ -33,15 +34,16 @@ class Figures:
 
     @property
     def keys(self) -> list[str]:
-        """All faults that some chart can have, in the order of their first chart."""
-        return list(dict.fromkeys(key for told in self.told.values() for key in told))
+        """All faults that some chart can have, in the order of their table."""
+        found = {key for told in self.told.values() for key in told}
+        return [key for key in FAULTS if key in found]
 
     def best(self, key: str) -> str:
         """Return the chart that shows a fault best: named alone rather than not, and then the largest."""
 
         def merit(chart: str) -> tuple[bool, bool, float]:
             told = self.told[chart][key]
-            return told.named == (key,), told.caught, told.outside
+            return told.named == (key,), told.caught, told.size
 
         return max((chart for chart in self.told if key in self.told[chart]), key=merit)
 

@@ -15,10 +15,11 @@ tell apart. One command computes and writes it; it takes some minutes:
 
     $ python -m data_gen.faults
 
-Every fault that a chart's program can have is drawn in bytes by a machine with float32 colours, 8 fraction
-bits in the weights of its filters, and corners of triangles on a grid of 1/256 pixel. The image is held
-against the intervals of such a machine, of which filter and snapping are known, as `volref probe` tells
-them, and the rest is not; and against the set `webgl-highp`, for which nobody has to know anything.
+Every fault that a chart's program can have, at the first strength that it is listed with, is drawn in bytes
+by a machine with float32 colours, 8 fraction bits in the weights of its filters, and corners of triangles
+on a grid of 1/256 pixel. The image is held against the intervals of such a machine, of which filter and
+snapping are known, as `volref probe` tells them, and the rest is not; and against the set `webgl-highp`,
+for which nobody has to know anything.
 
 - *Caught*: the image leaves the intervals of the machine; *by anyone*: those of the set, too.
 - *Size*: the largest difference from the clean program, in 1/255.

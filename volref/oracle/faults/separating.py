@@ -31,7 +31,7 @@ SEPARATING = MappingProxyType(
         "L3": "checkers",
         "F1": "checkers",
         "F2": "fine-values",
-        "F3": "grey-slab",
+        "F3": "spike",
         "F4": "no-data",
         "D1": "wide-sphere",
         "D2": "wide-sphere",
