@@ -66,6 +66,8 @@ def write_bundle(
 ) -> Path:
     """Draw a scene, work out what a correct machine may draw of it, and write it all as a golden bundle.
 
+    Returns its folder.
+
     Parameters
     ----------
     folder
@@ -76,11 +78,6 @@ def write_bundle(
         `name`, a short name, that of the folder by default; `title`, a line for people; `truth`, a
         tolerance: the integral itself comes along, with a proven bound on its error; `overwrite`, whether a
         bundle that is there is replaced (nothing else ever is); `recipe`, what the bundle was made of.
-
-    Returns
-    -------
-    Path
-        The folder.
 
     Raises
     ------
