@@ -12,7 +12,7 @@ from itertools import product
 
 import numpy as np
 
-from volref.arrays import Floats, Indices
+from volref.arrays import Floats
 from volref.oracle.intervals.slack import Slack
 from volref.oracle.intervals.slopes import Slopes, fetch_steep
 from volref.stages.textures import Texture, cells_of, fetch
@@ -20,6 +20,9 @@ from volref.workspace import Workspace
 
 # Roundings in a linear fetch along three axes: each of a + f (b - a) has three.
 ROUNDINGS = 9
+
+# How far into the next step of a weight a place is moved to get the other weight, in steps.
+INTO = 0.3
 
 Places = list[Floats] | Floats
 
@@ -30,7 +33,7 @@ def fetched(
     """Return channels (C, n) of a texture at places up to a radius (n,), and how far these may be off."""
     texture = slopes.texture
     largest = max(texture.sizes)
-    texels = radius * largest + 2 * slack.control * largest
+    texels = radius * largest + 3 * slack.control * largest
     steepness: Floats | float = 0.0
     if texture.filter == "nearest":
         found, off = _nearest(slopes, place, texels, work)
@@ -82,20 +85,19 @@ def _with_bits(slopes: Slopes, place: Places, texels: Floats, work: Workspace) -
     found = fetch(texture, place, work)
     low, high = found, found.copy()
     quanta = 2.0 ** (texture.weight_bits or 0)
-    shifts, any_near = [], np.zeros(len(texels), np.bool_)
     reach = texels * quanta
+    sides, unsure = [], np.zeros(len(texels), np.bool_)
     for u, size in _axes(texture, place):
         step = u.astype(np.float64) * (size * quanta) - 0.5 * quanta
         beyond = step - np.floor(step) - 0.5
         near = np.abs(beyond) <= reach
-        any_near |= near
-        # Just over the middle between two steps, and a little farther than any place may be.
-        shifts.append(
-            np.where(near, -np.sign(beyond) * (np.abs(beyond) + reach + 1e-3), 0.0) / (size * quanta)
-        )
-    subset = np.flatnonzero(any_near)
-    for at, moved in _other_places(place, shifts, subset):
-        other = fetch(texture, moved, work)
+        unsure |= near
+        # Well into the steps on both sides: float32 itself may round a place to just between two.
+        sides.append([np.where(near, way * INTO - beyond, 0.0) / (size * quanta) for way in (-1, 1)])
+    at = np.flatnonzero(unsure)
+    for shifts in product(*sides) if len(at) else ():
+        moved = [(u[at] + shift[at]).astype(u.dtype) for u, shift in zip(place, shifts, strict=False)]
+        other = fetch(texture, [*moved, *(u[at] for u in place[len(moved) :])], work)
         low[:, at], high[:, at] = np.minimum(low[:, at], other), np.maximum(high[:, at], other)
     middle, off = (low + high) / 2, (high - low) / 2
     wide = np.flatnonzero(reach > 0.45)
@@ -104,27 +106,6 @@ def _with_bits(slopes: Slopes, place: Places, texels: Floats, work: Workspace) -
         byte = 0.0 if texture.result_bits is None else 1.0 / (2**texture.result_bits - 1)
         off[:, wide] = slopes.near[:, cell] * (texels[wide] + 1 / quanta) + 3 * byte
     return middle, off
-
-
-def _other_places(
-    place: Places, shifts: list[Floats], subset: Indices
-) -> Iterator[tuple[Indices, list[Floats]]]:
-    """Yield the points of a subset with one or more coordinates moved, for all choices of these."""
-    if not len(subset):
-        return
-    moves = [shift[subset] for shift in shifts]
-    for chosen in product((False, True), repeat=len(moves)):
-        if not any(chosen):
-            continue
-        used = [move for move, take in zip(moves, chosen, strict=True) if take]
-        here = np.flatnonzero(np.all([move != 0 for move in used], axis=0))
-        if len(here):
-            at = subset[here]
-            moved = [
-                (u[at] + (move[here] if take else 0.0)).astype(u.dtype)
-                for u, move, take in zip(place, moves, chosen, strict=False)
-            ]
-            yield at, [*moved, *(u[at] for u in place[len(moves) :])]
 
 
 def _axes(texture: Texture, place: Places) -> Iterator[tuple[Floats, int]]:

@@ -8,6 +8,7 @@ share one place in it: they are kept together, as the two ends of the curve's ch
 chord, not as a box of their ranges, which can be almost twice as wide.
 """
 
+import dataclasses
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -15,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from volref.arrays import Floats, Indices
-from volref.emulation.textures.lookup import Textures
+from volref.emulation.textures.lookup import Textures, read_at
 from volref.emulation.textures.uploads import table_place
 from volref.oracle.intervals.fetching import fetched
 from volref.oracle.intervals.slack import Slack
@@ -120,6 +121,11 @@ def classified(finder: Finder, value: Floats, radius: Floats, work: Workspace) -
     if len(crossed):
         bounds = first[crossed], last[crossed], low[crossed], high[crossed]
         spread[:, crossed] += _beside(finder, bounds, ends[:, :, crossed], linear=table.filter == "linear")
+    if table.weight_bits is not None:
+        # Each channel is a staircase of its own between the ends: nothing is known of the way there.
+        middle = (ends[0] + ends[1]) / 2
+        spread += np.abs(ends[1] - ends[0]) / 2
+        ends = np.stack([middle, middle])
     return ends, spread
 
 
@@ -186,6 +192,7 @@ def find(finder: Finder, position: Floats, radius: Floats, work: Workspace) -> R
     textures = finder.textures
     if textures.grid is not None:
         return atlases.between_sweeps(finder, position, radius, work)
+    position, radius = _read(finder, position, radius)
     if textures.pipeline.volume.layout == "atlas":
         return atlases.between_slices(finder, position, radius, work)
     found, off = fetched(finder.volume, position, radius, finder.slack, work)
@@ -195,6 +202,23 @@ def find(finder: Finder, position: Floats, radius: Floats, work: Workspace) -> R
     if gradients.has_texture(textures.pipeline):
         return gradients.with_gradient(finder, value, reach, found[1:], off[1:], work)
     return Reach(*classified(finder, value, reach, work), value, reach)
+
+
+def _read(finder: Finder, position: Floats, radius: Floats) -> tuple[Floats, Floats]:
+    """Return where samples at positions (3, n) are read in the texture, and up to what radii (n,)."""
+    switches, size = finder.textures.pipeline.volume, finder.textures.size
+    place = read_at(switches, size, position)
+    if place is position:
+        return position, radius
+    off = radius + 4 * finder.slack.control * (1 + np.abs(switches.shift) / min(size))
+    if switches.brick is not None:
+        # Read from the other brick, a place near the border of two lies up to a voxel further.
+        count = np.array(size, np.float64)[:, None]
+        whole = read_at(dataclasses.replace(switches, brick=None), size, position)
+        side = whole * count / switches.brick
+        near = np.abs(side - np.rint(side)) * switches.brick <= off * count
+        off = off + np.where(near, 1 / count, 0.0).max(axis=0)
+    return place, off
 
 
 def value_of(finder: Finder, channels: Floats, off: Floats) -> tuple[Floats, Floats]:
