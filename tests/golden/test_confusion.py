@@ -23,17 +23,24 @@ from volref.oracle.faults.table import FAULTS
 SAMPLE = {
     "f-shape": (
         "G1-half-voxel",
+        "G1-moved-box",
+        "G2-node-box",
         "G4-flip-x",
         "G6-brick-seams",
+        "O1-uncorrected",
         "O1-stale",
         "T1-never-reached",
         "C1-srgb-twice",
     ),
-    "two-entries": ("L1-half-texel", "L1-ends-for-centers", "L2-short-table", "O1-uncorrected"),
+    "two-entries": ("O1-stale", "O3-factor-per-sample", "T4-step", "L1-half-texel", "L2-short-table"),
 }
 
-# Digits of figures in the file.
-SIZE, SHARE = 0.01, 1e-4
+# Digits of sizes in the file.
+SIZE = 0.01
+
+# Intervals that have become narrower since the file was written catch more; they may not catch less than this
+# below it, some pixels of 1920, for exp and pow end in another bit on other processors.
+SHARE = 0.01
 
 
 @pytest.fixture(scope="module")
@@ -53,13 +60,13 @@ def test_figures_drawn_again_are_those_of_the_docs(shown, again):
         for key, told in study.told.items():
             kept = shown.told[name][key]
             assert abs(told.size - kept.size) <= SIZE
-            assert (told.outside, told.outside_any) == pytest.approx(
-                (kept.outside, kept.outside_any), abs=SHARE
-            )
-            assert told.explained == pytest.approx(kept.explained, abs=SHARE)
+            assert told.caught == kept.caught
+            assert told.outside >= kept.outside - SHARE
+            assert told.outside_any >= kept.outside_any - SHARE
+            assert told.explained >= kept.explained - SHARE
             # Fewer faults were tried here: none of those that are left explains it better than before.
             assert told.rank <= kept.rank
-            assert set(told.named) <= set(kept.named) or kept.rank > 1
+            assert kept.rank > 1 or set(told.named) == set(kept.named) & set(SAMPLE[name])
 
 
 def test_every_chart_and_every_fault_that_it_can_have_is_in_the_docs(shown):
