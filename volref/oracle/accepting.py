@@ -21,9 +21,8 @@ from volref.emulation.loop.opacity import OpacityRule, opacity_rule
 from volref.emulation.passes import emulate
 from volref.emulation.pipeline import Pipeline
 from volref.emulation.targets.canvas import cleared
-from volref.errors import SceneError
 from volref.oracle.acceptance import Acceptance
-from volref.oracle.intervals.advice import advice_for, low_quality_of
+from volref.oracle.intervals.advice import advice_for, check_bounded, low_quality_of
 from volref.oracle.intervals.canvases import frame_of
 from volref.oracle.intervals.casting import Cast, cast
 from volref.oracle.intervals.finding import Finder
@@ -61,16 +60,14 @@ def accept(
     Raises
     ------
     SceneError
-        If `emulate` refuses the scene or an argument, or the table has mip levels, whose choice no
-        specification bounds.
+        If `emulate` refuses the scene or an argument, or the program does what nothing bounds; see
+        `check_bounded`.
     """
     began = time.perf_counter()
     program = named(pipeline) if isinstance(pipeline, str) else pipeline
     machine = Device.named(device) if isinstance(device, str) else Device() if device is None else device
     check_kinds(scene, program, machine)
-    if program.table.filter == "linear-mipmap":
-        message = "pipeline.table.filter must be 'linear' or 'nearest' to be accepted, got 'linear-mipmap', "
-        raise SceneError(message + "whose levels no specification bounds; emulate and compare instead")
+    check_bounded(scene, program)
     count = whole_number("frames", frames, low=1, high=1 << 20)
     nominal = emulate(scene, program, machine, jitter, count)
     offsets = start_offsets(scene, program, jitter, count)

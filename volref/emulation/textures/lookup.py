@@ -135,7 +135,8 @@ def _value_of(textures: Textures, channels: Floats) -> Floats:
 
 
 def _per_slice(textures: Textures, pair: SlicePair, work: Workspace) -> Found:
-    values = fetch_slices(textures.volume, *pair[3:], work)
+    places = (pair.u1, pair.v1), (pair.u2, pair.v2)
+    values = [_value_of(textures, fetch(textures.volume, place, work)) for place in places]
     one = classified(textures, values[0], work)
     two = classified(textures, values[1], work)
     return Found(_between(textures, values[0], values[1], pair), _between(textures, one, two, pair))

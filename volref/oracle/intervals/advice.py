@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike
 
 from volref.emulation.device import Device
 from volref.emulation.pipeline import Pipeline
+from volref.errors import SceneError
 from volref.oracle.acceptance import Acceptance
 from volref.scene.scene import Scene
 
@@ -23,6 +24,34 @@ def advice_for(pipeline: Pipeline, device: Device) -> str:
             "another one; find the grid with: volref probe, and accept the device that it writes"
         )
     return ""
+
+
+def check_bounded(scene: Scene, pipeline: Pipeline) -> None:
+    """Refuse programs for whose images no interval is known.
+
+    Raises
+    ------
+    SceneError
+        With the switch.
+    """
+    accumulation, meshes = pipeline.accumulation, bool(scene.meshes)
+    straight, lit = accumulation.color == "straight", pipeline.lighting.model != "none"
+    own_alpha, divides = accumulation.alpha != "accumulated", accumulation.normalize != "none"
+    reasons = {
+        "table.filter": (pipeline.table.filter == "linear-mipmap", "a level that no specification bounds"),
+        "lighting.normals": (lit and pipeline.lighting.normals == "unguarded", "0 / 0 without a gradient"),
+        "accumulation.alpha": (own_alpha and meshes, "another alpha than that of what is before a mesh"),
+        "accumulation.normalize": (divides and meshes, "colours divided by an alpha before a mesh is added"),
+        "accumulation.color": (
+            not straight and (divides or accumulation.alpha == "weighted"),
+            "premultiplied colours, that are divided or weighted by an alpha",
+        ),
+        "output.blend": (pipeline.output.blend == "environment" and meshes, "an environment behind meshes"),
+    }
+    for name, (holds, why) in reasons.items():
+        if holds:
+            message = f"pipeline.{name} must be one whose image has bounds, got {why}; "
+            raise SceneError(message + "change it, or emulate and compare")
 
 
 def low_quality_of(

@@ -13,7 +13,7 @@ from volref.emulation.surfaces.composition import with_object
 from volref.emulation.surfaces.depths import surface_colors
 from volref.emulation.targets.canvas import store
 from volref.oracle.intervals.casting import Cast
-from volref.oracle.intervals.compositing import Behind, Outcome, composited
+from volref.oracle.intervals.compositing import Behind, Outcome, brightest, composited
 from volref.oracle.intervals.finishing import blends_as_last_sample, finished, fragments_of
 from volref.oracle.intervals.gradients import Lit
 from volref.oracle.intervals.slack import Slack
@@ -67,7 +67,7 @@ def _fragments(course: Course, lit: Lit | None, upon: Pair) -> tuple[Pair, Float
         outcome = summed(course, lit, channels, (lambda *one: _met(course, *one)) if cut else None)
         if not cut and rays.covered.any():
             outcome = _upon_meshes(course, outcome)
-    colors = fragments_of(outcome.low, outcome.high, accumulation)
+    colors = fragments_of(outcome.low, outcome.high, accumulation, brightest(course))
     alpha = Pair(outcome.low[-1], outcome.high[-1])
     mapped = drawing.pipeline.output.mean_format is None
     both = [finished(drawing, colors, alpha, side, slack, mapped=mapped) for side in upon]

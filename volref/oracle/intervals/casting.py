@@ -20,6 +20,7 @@ from volref.oracle.intervals.faces import byte_variants, shifted, varying_error,
 from volref.oracle.intervals.rays import Rays, merged
 from volref.oracle.intervals.slabs import Lines, cuts_of, lines_of
 from volref.oracle.intervals.slack import Slack
+from volref.scene.transform import transform_points
 
 # Corners of the square within which window positions may lie.
 CORNERS = ((-1.0, -1.0), (1.0, -1.0), (-1.0, 1.0), (1.0, 1.0))
@@ -86,14 +87,11 @@ def _slab_rays(drawing: Drawing, one: Approach, lines: Lines, slack: Slack) -> t
     behind, covered = np.zeros((pixels, 4)), np.zeros(pixels, np.bool_)
     if "mesh_distance" in one.targets:
         distance = one.targets["mesh_distance"].reshape(pixels).astype(np.float64)
-        t = distance / lines.unit
+        before = _before(drawing, lines)
+        t = (distance - before) / lines.unit
         # Interpolated positions are off by some ten operations of their size, their length by as many.
-        until = (
-            t,
-            np.where(
-                distance < NOWHERE / 2, 24 * unit * (np.abs(t) + drawing.scene.camera.near / lines.unit), 0
-            ),
-        )
+        size = np.abs(t) + (drawing.scene.camera.near + before) / lines.unit
+        until = (t, np.where(distance < NOWHERE / 2, 24 * unit * size, 0))
         behind = one.targets["mesh_color"].reshape(pixels, 4).astype(np.float64)
         covered = behind[:, 3] > 0
     cuts = cuts_of(lines, slack, until)
@@ -106,6 +104,15 @@ def _slab_rays(drawing: Drawing, one: Approach, lines: Lines, slack: Slack) -> t
         path_off = cuts.beside[at] + cuts.entry_along[at] + unit
     rays = Rays(ends, entry_off, exit_off, none, path_off, behind[at], covered[at])
     return rays, at[~cuts.sure[at]]
+
+
+def _before(drawing: Drawing, lines: Lines) -> Floats:
+    """Return how far (P,) in the world lines begin behind where distances of meshes are measured from."""
+    scene = drawing.scene
+    if drawing.pipeline.rays.direction != "unproject" or scene.camera.is_parallel:
+        return np.zeros(lines.origin.shape[1])
+    begin = transform_points(drawing.box.world_from_texture, lines.origin.T)
+    return np.asarray(np.linalg.norm(begin - scene.camera.world_from_view[:3, 3], axis=1))
 
 
 def _face_rays(drawing: Drawing, one: Approach, slack: Slack, *, bytes_too: bool) -> Rays:

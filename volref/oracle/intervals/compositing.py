@@ -33,10 +33,11 @@ CHUNK = 1 << 12
 
 
 class Step(NamedTuple):
-    """An iteration, and which of its rays (n,) may end after it."""
+    """An iteration, which of its rays (n,) may end after it, and which of them as opaque ones."""
 
     iteration: Iteration
     after: Test
+    full: Test | None = None
 
 
 class Outcome(NamedTuple):
@@ -81,15 +82,17 @@ def _steps(course: Course, lit: Lit | None, ray: Indices, work: Workspace) -> li
     steps: list[Step] = []
     low, high = np.zeros(len(ray)), np.zeros(len(ray))
     threshold, gone = course.drawing.pipeline.stepping.opaque_at, np.zeros(len(ray), np.bool_)
+    apart = course.drawing.pipeline.stepping.stopped == "opaque"
     for one in iterations(course, lit, ray, gone, work):
-        after = one.after
+        step = Step(one, one.after)
         if threshold is not None:
             some = one.at[one.some]
             low[some], high[some] = _more(Pair(low[some], high[some]), one.share)
             full = opaque(course, Pair(low[one.at], high[one.at]), threshold)
-            after = Test(after.sure | full.sure, after.maybe | full.maybe)
             gone[one.at] |= full.sure
-        steps.append(Step(one, after))
+            ends = Test(one.after.sure | full.sure, one.after.maybe | full.maybe)
+            step = Step(one, one.after, full) if apart else Step(one, ends)
+        steps.append(step)
     return steps
 
 
@@ -105,10 +108,22 @@ def _backwards(course: Course, steps: list[Step], behind: Behind) -> tuple[Float
     """Return the least and the greatest of rays (C + 1, n), from the last sample to the first."""
     low, high = behind.end.low.copy(), behind.end.high.copy()
     branch, taken = np.zeros(low.shape[1]), np.zeros(low.shape[1])
-    for (at, before, hit, _, some, share), after in reversed(steps):
+    stopped = behind.end
+    if course.drawing.pipeline.stepping.stopped == "opaque":
+        # An alpha of 1 that nothing behind has had a part in: black behind it is all of 1 - A.
+        black = np.zeros_like(low)
+        black[-1] = 1.0
+        stopped = Pair(black, black)
+    premultiplied = course.drawing.pipeline.accumulation.color == "premultiplied"
+    for (at, before, hit, _, some, share), after, full in reversed(steps):
         here = low, high, branch
         _or_else(here, behind.end, at, after.maybe, after.sure)
-        if len(some):
+        if full is not None:
+            _or_else(here, stopped, at, full.maybe, full.sure)
+        if len(some) and premultiplied:
+            _premultiplied_in_front(share, here, at[some])
+            taken[at[some]] += 1
+        elif len(some):
             _in_front(share, here, at[some])
             taken[at[some]] += 1
         _or_else(here, behind.end, at, before.maybe, before.sure)
@@ -116,12 +131,12 @@ def _backwards(course: Course, steps: list[Step], behind: Behind) -> tuple[Float
             _or_else(here, behind.mesh, at, hit.maybe, hit.sure & ~before.maybe)
     # An alpha of n sums is off by at most n u A, a colour by n u C and by n u A times the brightest sample.
     largest = np.maximum(np.abs(low), np.abs(high))
-    brightest = _brightest(course)
-    rounding = course.finder.slack.values * (2 * taken + 8) * np.maximum(largest, largest[-1] * brightest)
+    brightness = largest[-1] * brightest(course)
+    rounding = course.finder.slack.values * (2 * taken + 8) * np.maximum(largest, brightness)
     return low - rounding, high + rounding, branch
 
 
-def _brightest(course: Course) -> float:
+def brightest(course: Course) -> float:
     """Return a bound of the colours of samples."""
     table = float(np.abs(course.finder.textures.table.texels[..., :3]).max(initial=0.0))
     lights = 1.0 + sum(float(np.max(light.color)) for light in course.drawing.scene.lights)
@@ -175,6 +190,17 @@ def _in_front(share: Share, here: Results, ray: Indices) -> None:
     here[0][:count, ray], here[1][:count, ray] = least, most
     here[0][count, ray], here[1][count, ray] = opaque_low, opaque_high
     here[2][ray] *= np.minimum(clear, 1)
+
+
+def _premultiplied_in_front(share: Share, here: Results, ray: Indices) -> None:
+    """Do the same with colours that count as premultiplied: c + (1 - a) B, and alpha as ever."""
+    count = len(share.color_off)
+    behind = here[0][:count, ray], here[1][:count, ray]
+    _in_front(share, here, ray)
+    a = (share.opacity.min(axis=0) - share.opacity_off, share.opacity.max(axis=0) + share.opacity_off)
+    rest = np.array([(1 - one) * bound for one in a for bound in behind])
+    here[0][:count, ray] = share.color.min(axis=0) - share.color_off + rest.min(axis=0)
+    here[1][:count, ray] = share.color.max(axis=0) + share.color_off + rest.max(axis=0)
 
 
 def _in_front_of_more(share: Share, here: Results, ray: Indices) -> None:

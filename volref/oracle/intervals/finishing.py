@@ -28,13 +28,17 @@ def blends_as_last_sample(drawing: Drawing) -> bool:
     output, device = drawing.pipeline.output, drawing.device
     narrow = output.precision == "mediump" and device.fragment_color == "float16"
     plain = output.tone_map == "none" and output.gamma == 1.0 and output.discard_below is None
-    simple = drawing.pipeline.accumulation.alpha == "accumulated" and not narrow and plain
+    rule = drawing.pipeline.accumulation
+    simple = rule.alpha == "accumulated" and rule.normalize == "none" and not narrow and plain
     whole = output.format == "unorm8" and device.blend == "integer"
     return simple and output.blend == "premultiplied" and not whole
 
 
-def fragments_of(low: Floats, high: Floats, accumulation: Accumulation) -> Pair:
-    """Return what shaders have after their loops (F, 4), of colours, own alpha if written, and alpha."""
+def fragments_of(low: Floats, high: Floats, accumulation: Accumulation, brightest: float) -> Pair:
+    """Return what shaders have after their loops (F, 4), of colours, own alpha if written, and alpha.
+
+    brightest: the brightest colour of samples, which no colour divided by alpha exceeds.
+    """
     bounds = []
     for picks in product((0, 1), repeat=2):
         color, alpha = ((low, high)[side] for side in picks)
@@ -51,6 +55,12 @@ def fragments_of(low: Floats, high: Floats, accumulation: Accumulation) -> Pair:
             extra[crossing, :3] = color[:3, crossing].T
             bounds.append(extra if side == 0 else np.where(crossing[:, None], extra, bounds[0]))
     stacked = np.array(bounds)
+    if accumulation.normalize == "always":
+        # A quotient of two numbers that may both be 0 is any colour between black and the brightest.
+        stacked = np.concatenate([stacked, stacked[:1], stacked[:1]])
+        nothing = low[-1] <= 0
+        stacked[-2, nothing, :3], stacked[-1, nothing, :3] = 0.0, brightest
+        stacked[..., :3] = np.clip(stacked[..., :3], 0.0, brightest)
     return Pair(stacked.min(axis=0), stacked.max(axis=0))
 
 
@@ -63,7 +73,7 @@ def finished(
     target, whose tone map is applied here.
     """
     output, device = drawing.pipeline.output, drawing.device
-    outcomes = []
+    outcomes, alphas = [], []
     for corner in _corners(fragments, output, slack):
         colors = [corner]
         if output.blend == "environment":
@@ -71,6 +81,7 @@ def finished(
             colors = [over_environment(corner, one, behind, rule) for one in alpha]
         for color in colors:
             done = tone_mapped(color, output, drawing.scene.background) if mapped else color
+            alphas.append(done[:, 3])
             outcomes.append(_blended(done, behind, output, device))
     if output.blend == "straight":
         outcomes.append(_least_straight(outcomes[0], fragments, behind, integer=device.blend == "integer"))
@@ -79,7 +90,12 @@ def finished(
     off = 24 * slack.values * np.maximum(1.0, np.maximum(np.abs(low), np.abs(high)))
     if output.gamma != 1.0 or output.tone_map != "none":
         off = off + slack.power(1.0)
-    return Pair(low - off, high + off)
+    if output.discard_below is None:
+        return Pair(low - off, high + off)
+    written, seen = np.array(alphas), output.discard_below
+    kept, left = (written.max(axis=0) >= seen)[:, None], (written.min(axis=0) < seen)[:, None]
+    low, high = (np.where(kept, side, behind) for side in (low - off, high + off))
+    return Pair(np.where(left, np.minimum(low, behind), low), np.where(left, np.maximum(high, behind), high))
 
 
 def _least_straight(outcome: Floats, fragments: Pair, behind: Floats, *, integer: bool) -> Floats:

@@ -87,8 +87,11 @@ def _light(
     material = lit.lights.material if lit.lights is not None else scene.material
     points = transform_points(place.points, position.T.astype(np.float64)).T
     gradient, gradient_off, _ = _gradient(finder, position, radius, reach)
-    length, normals = length_and_direction(in_world(gradient, place.normals))
-    steepest = float(np.linalg.norm(place.normals[:3, :3], 2))
+    turns = lighting.normals != "untransformed"
+    length, normals = length_and_direction(in_world(gradient, place.normals) if turns else gradient)
+    if lighting.normals == "inward":
+        normals = -normals
+    steepest = float(np.linalg.norm(place.normals[:3, :3], 2)) if turns else 1.0
     turned = np.where(length > 0, 2 * steepest * gradient_off / np.where(length > 0, length, 1), 2.0)
     if reach.magnitude is not None and lighting.flat == "ambient":
         flat = reach.magnitude < FLAT

@@ -50,6 +50,7 @@ class Iteration(NamedTuple):
 class _Placed(NamedTuple):
     """One iteration before it is looked up."""
 
+    number: int
     at: Indices
     ray: Indices
     before: Test
@@ -96,7 +97,7 @@ def _placed(course: Course, walk: Walk, at: Indices, number: int) -> tuple[_Plac
     sampled = walk.position
     advanced(course, walk)
     after = own_end_after(course, walk, sampled)
-    one = _Placed(at, here, before, hit, after, position, radius, part)
+    one = _Placed(number, at, here, before, hit, after, position, radius, part)
     done = over | after.sure
     if done.any():
         kept = np.flatnonzero(~done)
@@ -113,8 +114,9 @@ def _looked_up(
     radius = np.concatenate([one.radius for one in placed])
     ray = np.concatenate([one.ray for one in placed])
     part = _joined_parts([one.part for one in placed])
+    skipped = course.drawing.pipeline.stepping.skipped
     over = np.concatenate(
-        [one.before.sure if one.hit is None else one.before.sure | one.hit.sure for one in placed]
+        [one.before.sure | (one.number < skipped) | (one.hit is not None and one.hit.sure) for one in placed]
     )
     reach = find(course.finder, position, radius, work)
     some = np.flatnonzero(~over & visible(course, reach))
@@ -132,7 +134,11 @@ def _looked_up(
 
 
 def visible(course: Course, reach: Reach) -> Booleans:
-    """Tell which samples (n,) may have any opacity."""
+    """Tell which samples (n,) may have any opacity, or change what is there without."""
+    accumulation = course.drawing.pipeline.accumulation
+    if accumulation.rule == "reversed-over" or accumulation.color == "premultiplied":
+        # A transparent sample makes A C of C, C = a c + (1 - a) A C, or adds its c without an a.
+        return np.ones(len(reach.value), np.bool_)
     if course.drawing.rule.source == "value":
         return np.asarray((reach.value != 0) | (reach.radius > 0))
     return np.asarray((reach.ends[0, 3] != 0) | (reach.ends[1, 3] != 0) | (reach.spread[3] > 0))

@@ -38,6 +38,8 @@ def share_of(course: Course, reach: Reach, ray: Indices, part: Pair | None) -> S
         table = np.stack([reach.value - reach.radius, reach.value + reach.radius])
         beside = np.full_like(reach.radius, 2 * course.finder.slack.values)
     opacity, off = _by_step(course.finder, rule, table, beside, ray, part, course.walks.relative)
+    if rule.times != 1.0:
+        opacity, off = opacity * rule.times, off * rule.times
     if rule.by_gradient:
         assert reach.magnitude is not None
         assert reach.gradient_radius is not None

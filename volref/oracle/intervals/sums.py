@@ -68,7 +68,7 @@ def _run(
             if one.hit is not None:
                 _put_down(course, result, ray, total, one.at[one.hit.maybe & going], number, meeting)
                 going &= ~one.hit.sure
-            _add(course, total, one.share, one.at[one.some])
+            _add(course, total, one.share, one.at[one.some], ray)
             after = one.after
             if threshold is not None:
                 full = opaque(course, total.alpha.take(one.at), threshold)
@@ -96,6 +96,11 @@ def _put_down(
     grown = 1 + np.maximum(np.abs(total.low[:, at]), np.abs(total.high[:, at]))
     low = np.concatenate([total.low[:, at] - off * grown, total.alpha.low[None, at] - off])
     high = np.concatenate([total.high[:, at] + off * grown, (total.alpha.high[at] * (1 + off) + off)[None]])
+    stepping = course.drawing.pipeline.stepping
+    if stepping.stopped == "opaque" and stepping.opaque_at is not None:
+        full = opaque(course, total.alpha.take(at), stepping.opaque_at)
+        low[-1] = np.where(full.sure, 1.0, np.where(full.maybe, np.minimum(low[-1], 1.0), low[-1]))
+        high[-1] = np.where(full.sure, 1.0, np.where(full.maybe, np.maximum(high[-1], 1.0), high[-1]))
     if meeting is not None:
         low, high = meeting(low, high, here)
     result[0][:, here] = np.minimum(result[0][:, here], low)
@@ -103,14 +108,38 @@ def _put_down(
     result[2][here] += 1
 
 
-def _add(course: Course, total: Sum, share: Share, at: Indices) -> None:
+def _add(course: Course, total: Sum, share: Share, at: Indices, ray: Indices) -> None:
     """Add samples to the sums of rays, in place."""
     if not len(at):
         return
     before = total.take(at)
-    grown = _added(course, before, share)
+    gathers = course.drawing.pipeline.accumulation.rule in ("mean", "greatest")
+    grown = _gathered(course, before, share, ray[at]) if gathers else _added(course, before, share)
     total.low[:, at], total.high[:, at] = grown.low, grown.high
     total.alpha.low[at], total.alpha.high[at] = grown.alpha
+
+
+def _gathered(course: Course, total: Sum, share: Share, ray: Indices) -> Sum:
+    """Return sums with another sample, of programs that take the mean of samples or the most opaque one."""
+    one, two = share.opacity
+    a = Pair(np.minimum(one, two) - share.opacity_off, np.maximum(one, two) + share.opacity_off)
+    c = Pair(share.color.min(axis=0) - share.color_off, share.color.max(axis=0) + share.color_off)
+    shown = _product(a, c)
+    if course.drawing.pipeline.accumulation.rule == "mean":
+        walks = course.walks
+        step, length = walks.paths.step[ray].astype(np.float64), walks.paths.length[ray].astype(np.float64)
+        part = step / length
+        off = part * (walks.length_off[ray] / length + walks.step_off[ray] / step)
+        off = off + part * 8 * course.finder.slack.values
+        each = Pair(part - off, part + off)
+        more, new = _product(a, each), _product(shown, each)
+        alpha = Pair(total.alpha.low + more.low, total.alpha.high + more.high)
+        return Sum(total.low + new.low, total.high + new.high, alpha)
+    sure, maybe = a.low > total.alpha.high, a.high > total.alpha.low
+    low = np.where(maybe, np.minimum(total.low, shown.low), total.low)
+    high = np.where(maybe, np.maximum(total.high, shown.high), total.high)
+    alpha = Pair(np.maximum(total.alpha.low, a.low), np.maximum(total.alpha.high, a.high))
+    return Sum(np.where(sure, shown.low, low), np.where(sure, shown.high, high), alpha)
 
 
 def _added(course: Course, total: Sum, share: Share) -> Sum:
@@ -126,8 +155,9 @@ def _added(course: Course, total: Sum, share: Share) -> Sum:
         new = _product(a, c)
         left = _product(Pair(1 - a.high, 1 - a.low), alpha)
         return Sum(new.low + kept.low, new.high + kept.high, Pair(a.low + left.low, a.high + left.high))
-    weight = _product(Pair(1 - alpha.high, 1 - alpha.low), a)
-    new = _product(weight, c)
+    shown = Pair(1 - alpha.high, 1 - alpha.low)
+    weight = _product(shown, a)
+    new = _product(shown if course.drawing.pipeline.accumulation.color == "premultiplied" else weight, c)
     more = weight if rule == "over" else a
     grown = Pair(alpha.low + more.low, alpha.high + more.high)
     if rule == "over":

@@ -119,7 +119,7 @@ def _on_faces(entry: Floats, position: Pair) -> Pair:
 
 
 def place_of(course: Course, walk: Walk, number: int) -> tuple[Floats, Floats, Pair | None]:
-    """Return positions (3, n), their radius (n,), and what share of a whole step they stand for."""
+    """Return positions (3, n), their radius (n,), and for what share of a whole step they stand."""
     stepping, walks, unit = course.drawing.pipeline.stepping, course.walks, course.finder.slack.control
     ray = walk.ray
     if stepping.advance == "add":
@@ -135,7 +135,10 @@ def place_of(course: Course, walk: Walk, number: int) -> tuple[Floats, Floats, P
         half = (walk.walked.high - walk.walked.low) / 2
         radius = np.maximum(entry_off, walks.exit_off[ray]) + np.abs(along).max(axis=0) * half + 6 * unit
         return entry + along * t, radius, None
-    share = _share(course, ray, number)
+    left = _left(course, ray, number)
+    share = part = None if left is None else Pair(*(np.clip(side, 0.0, 1.0) for side in left))
+    if left is not None and share is not None and stepping.last_step == "doubled":
+        part = _doubled(left, share)
     middle = (walk.offset.low + walk.offset.high) / 2
     half = (walk.offset.high - walk.offset.low) / 2
     if share is not None:
@@ -147,7 +150,7 @@ def place_of(course: Course, walk: Walk, number: int) -> tuple[Floats, Floats, P
     step = paths.texture_step[ray]
     # A place on the machine's own line, a known distance behind its entry.
     radius = walks.path_off[ray] + step * half + 8 * unit
-    return position, radius, share
+    return position, radius, part
 
 
 def _half_width(low: Floats, high: Floats, unit: float) -> Floats:
@@ -157,14 +160,23 @@ def _half_width(low: Floats, high: Floats, unit: float) -> Floats:
     return np.asarray(wide * wide.dtype.type(0.5) + np.where(wide > 0, 2 * unit, 0.0))
 
 
-def _share(course: Course, ray: Indices, number: int) -> Pair | None:
+def _left(course: Course, ray: Indices, number: int) -> Pair | None:
+    """Return how many steps are left of rays before iteration `number`; None where every step is whole."""
     stepping, walks = course.drawing.pipeline.stepping, course.walks
-    if stepping.last_step != "partial" or stepping.end != "length-before":
+    if stepping.last_step not in ("partial", "doubled") or stepping.end != "length-before":
         return None
     step = walks.paths.step[ray].astype(np.float64)
     left = walks.paths.length[ray].astype(np.float64) - number * step
     off = walks.length_off[ray]
-    return Pair(*(np.clip((left + side * off) / step, 0.0, 1.0) for side in (-1, 1)))
+    return Pair(*((left + side * off) / step for side in (-1, 1)))
+
+
+def _doubled(left: Pair, share: Pair) -> Pair:
+    """Return for how many steps samples stand whose step is counted twice where no more than it is left."""
+    twice = left.high <= 1
+    maybe = (left.low <= 1) & ~twice
+    low = np.where(maybe, np.minimum(2 * share.low, 1), np.where(twice, 2, 1) * share.low)
+    return Pair(low, np.where(twice | maybe, 2, 1) * share.high)
 
 
 def advanced(course: Course, walk: Walk) -> None:
