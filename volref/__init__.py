@@ -57,8 +57,8 @@ if TYPE_CHECKING:
     from volref.oracle.acceptance import Acceptance
     from volref.oracle.acceptance_files import load_acceptance, save_acceptance
     from volref.oracle.accepting import accept
-    from volref.oracle.faults.fault import Subject
     from volref.oracle.explanation import Explanation, explain
+    from volref.oracle.faults.fault import Subject
     from volref.oracle.metrics import Comparison, compare
     from volref.oracle.shrinking import shrink
     from volref.oracle.tracing import trace

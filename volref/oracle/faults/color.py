@@ -16,7 +16,7 @@ GAMMA = 2.2
 
 
 def _bent(subject: Subject, gamma: float) -> Subject:
-    """Return a subject that raises its colours to 1 / gamma once more; a background's light stays as it is."""
+    """Return a subject that raises its colours to 1 / gamma once more, but not its background's light."""
     now = subject.pipeline.output.gamma
     if now == 1.0:
         return switched(subject, output={"gamma": gamma})
