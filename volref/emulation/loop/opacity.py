@@ -35,6 +35,12 @@ class OpacityRule:
     by_gradient: float = 0.0
     times: float = 1.0
 
+    @property
+    def at_most_one(self) -> bool:
+        """Whether no opacity of the table can become one above 1."""
+        plain = self.corrected or float(np.max(self.scale, initial=0.0)) <= 1
+        return plain and self.times <= 1 and not self.by_gradient
+
     def opacity(self, found: Found, ray: Indices, share: Floats | None) -> Floats:
         """Return the opacity (n,) of samples on rays `ray` (n,) whose step is `share` (n,) of a whole one."""
         opacity = self._by_step(found.value if self.source == "value" else found.color[3], ray, share)

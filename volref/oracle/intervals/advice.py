@@ -36,12 +36,20 @@ def check_bounded(scene: Scene, pipeline: Pipeline) -> None:
     """
     accumulation, meshes = pipeline.accumulation, bool(scene.meshes)
     straight, lit = accumulation.color == "straight", pipeline.lighting.model != "none"
-    own_alpha, divides = accumulation.alpha != "accumulated", accumulation.normalize != "none"
+    own_alpha = accumulation.alpha != "accumulated"
+    # An alpha of *over* is never above 1.
+    divides = accumulation.normalize == "always" or (
+        accumulation.normalize == "above-one" and accumulation.rule != "over"
+    )
     reasons = {
         "table.filter": (pipeline.table.filter == "linear-mipmap", "a level that no specification bounds"),
         "lighting.normals": (lit and pipeline.lighting.normals == "unguarded", "0 / 0 without a gradient"),
         "accumulation.alpha": (own_alpha and meshes, "another alpha than that of what is before a mesh"),
         "accumulation.normalize": (divides and meshes, "colours divided by an alpha before a mesh is added"),
+        "accumulation.rule": (
+            accumulation.alpha == "weighted" and not accumulation.rule.startswith(("over", "add")),
+            "samples without a weight, whose own alpha is to be weighted",
+        ),
         "accumulation.color": (
             not straight and (divides or accumulation.alpha == "weighted"),
             "premultiplied colours, that are divided or weighted by an alpha",

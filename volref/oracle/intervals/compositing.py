@@ -14,6 +14,7 @@ Programs with other sums are taken front to back, with intervals of colour and a
 """
 
 from dataclasses import dataclass
+from functools import partial
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
@@ -114,17 +115,19 @@ def _backwards(course: Course, steps: list[Step], behind: Behind) -> tuple[Float
         black = np.zeros_like(low)
         black[-1] = 1.0
         stopped = Pair(black, black)
-    premultiplied = course.drawing.pipeline.accumulation.color == "premultiplied"
+    in_front = partial(
+        _premultiplied_in_front
+        if course.drawing.pipeline.accumulation.color == "premultiplied"
+        else _in_front,
+        at_most_one=course.drawing.rule.at_most_one,
+    )
     for (at, before, hit, _, some, share), after, full in reversed(steps):
         here = low, high, branch
         _or_else(here, behind.end, at, after.maybe, after.sure)
         if full is not None:
             _or_else(here, stopped, at, full.maybe, full.sure)
-        if len(some) and premultiplied:
-            _premultiplied_in_front(share, here, at[some])
-            taken[at[some]] += 1
-        elif len(some):
-            _in_front(share, here, at[some])
+        if len(some):
+            in_front(share, here, at[some])
             taken[at[some]] += 1
         _or_else(here, behind.end, at, before.maybe, before.sure)
         if hit is not None:
@@ -159,10 +162,11 @@ def _or_else(here: Results, other: Pair, at: Indices, maybe: Booleans, sure: Boo
     branch[ray] = np.where(only, 0.0, branch[ray] + widened)
 
 
-def _in_front(share: Share, here: Results, ray: Indices) -> None:
-    """Put samples in front of the results of rays, in place."""
+def _in_front(share: Share, here: Results, ray: Indices, *, at_most_one: bool) -> None:
+    """Put samples in front of the results of rays, in place; at_most_one: no opacity is above 1."""
     # The last row is alpha.  Where one is above 1, more in front makes less of what is behind.
-    if max(share.opacity.max(), here[1][-1].max()) > 1:
+    most = share.opacity.max() if at_most_one else (share.opacity + share.opacity_off).max()
+    if max(most, here[1][-1].max()) > 1:
         _in_front_of_more(share, here, ray)
         return
     every = len(ray) == here[0].shape[1]
@@ -192,11 +196,11 @@ def _in_front(share: Share, here: Results, ray: Indices) -> None:
     here[2][ray] *= np.minimum(clear, 1)
 
 
-def _premultiplied_in_front(share: Share, here: Results, ray: Indices) -> None:
+def _premultiplied_in_front(share: Share, here: Results, ray: Indices, *, at_most_one: bool) -> None:
     """Do the same with colours that count as premultiplied: c + (1 - a) B, and alpha as ever."""
     count = len(share.color_off)
     behind = here[0][:count, ray], here[1][:count, ray]
-    _in_front(share, here, ray)
+    _in_front(share, here, ray, at_most_one=at_most_one)
     a = (share.opacity.min(axis=0) - share.opacity_off, share.opacity.max(axis=0) + share.opacity_off)
     rest = np.array([(1 - one) * bound for one in a for bound in behind])
     here[0][:count, ray] = share.color.min(axis=0) - share.color_off + rest.min(axis=0)

@@ -39,6 +39,7 @@ def fetched(
         found, off = _nearest(slopes, place, texels, work)
     elif texture.weight_bits is not None:
         found, off = _with_bits(slopes, place, texels, work)
+        steepness = slopes.largest[:, None]
     else:
         found, off, steepness = _linear(slopes, place, texels, slack, work)
     far = np.flatnonzero(texels > 1)
@@ -46,7 +47,7 @@ def fetched(
         cell, _ = cells_of(texture, [u[far] for u in place], work)
         off[:, far] = slopes.span(texels[far], cell)
     if texture.result_bits is None and slack.values:
-        # Texels of the cell are no larger than what is found in it and its slope.
+        # Texels of the cell are no larger than what is found in it and its slope, or than any.
         off += ROUNDINGS * slack.values * (np.abs(found) + steepness)
     return found, off
 

@@ -47,6 +47,12 @@ class Slopes:
         return np.asarray(2 * self.near.max(axis=1))
 
     @cached_property
+    def largest(self) -> Floats:
+        """Size (C,) of the largest texel."""
+        texels = self.texture.texels
+        return np.asarray(np.abs(texels).reshape(-1, texels.shape[-1]).max(axis=0).astype(np.float64))
+
+    @cached_property
     def near(self) -> Floats:
         """Slope (C, cells) of the steepest of each cell and its neighbours."""
         from scipy import ndimage
