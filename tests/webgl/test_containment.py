@@ -1,0 +1,32 @@
+"""Every pixel of every correct image lies in its interval: real WebGL, no exceptions."""
+
+import pytest
+
+from tests.webgl.cases import cases
+from tests.webgl.containing import contained
+
+# Voxels of three lengths, rays that end opaque, slices beyond the outer ones, meshes through the box, lights,
+# radars around and above: `python -m tests.webgl.containing` draws all scenes there are.
+SCENES = ("turned", "dense", "full", "mesh through", "lit from near", "edges", "radar storm", "radar uneven")
+
+# Widths in 1/255 that programs which composite by over stay below before bytes; see docs/containment.md.
+TIGHT = {"p50": 0.2, "p99": 2.0, "ambiguous": 0.015}
+
+
+# Floats are judged on some of them: what bytes round away they show.
+FLOATS = ("turned", "dense", "radar storm")
+
+CASES = [case for case in cases() if case.scene in (FLOATS if case.format == "float" else SCENES)]
+
+
+@pytest.mark.parametrize("case", CASES, ids=str)
+def test_every_correct_image_lies_in_its_intervals(webgl, case):
+    found = contained(webgl, case, webgl.name)
+    said = f"{webgl.name}, {case}: {found}"
+    print(said)
+    assert found.pixels > 500, said
+    assert found.outside == 0, said
+    if case.format == "float" and case.described().accumulation.rule == "over":
+        assert found.percentile(50) <= TIGHT["p50"], said
+        assert found.percentile(99) <= TIGHT["p99"], said
+        assert found.ambiguous <= TIGHT["ambiguous"], said
