@@ -115,7 +115,7 @@ def _canvas(drawing: Drawing, offsets: Floats, free: float) -> tuple[Pair, Pair,
     mean = Pair(clear, clear)
     ambiguous = np.zeros(len(clear), np.bool_)
     # Of a ray as short as its ends may be off, nobody knows the direction.
-    ambiguous[rays.pixel[walks.relative >= 0.5]] = True
+    ambiguous[rays.pixel[(walks.relative >= 0.5) & (slack.control > 0)]] = True
     branch = np.zeros(len(clear))
     for number, offset in enumerate(offsets, start=1):
         start = offset[rays.pixel].astype(device.control_type)

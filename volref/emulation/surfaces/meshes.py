@@ -69,6 +69,9 @@ def check_meshes(scene: Scene, pipeline: Pipeline) -> None:
         message = f"pipeline.meshes.kind must not be 'depth' for rays of kind {pipeline.rays.kind!r} with "
         message += f"stepping.rule {pipeline.stepping.rule!r}, got 'depth'; "
         raise SceneError(message + "take rays of kind 'coordinates' with rule 'count', or another kind")
+    if kind == "depth" and pipeline.table.filter == "linear-mipmap":
+        message = f"pipeline.table.filter must be 'linear' or 'nearest' where {name} compares depths, got "
+        raise SceneError(message + "'linear-mipmap'; change it, or set pipeline.meshes.kind")
     if kind == "depth" and pipeline.meshes.depth == "linear" and not np.isfinite(scene.camera.far):
         message = f"camera.far must be finite for {name}, whose depth is a share of near to far, got inf; "
         raise SceneError(message + "move the plane to behind the scene")

@@ -73,7 +73,9 @@ def composited(course: Course, lit: Lit | None, behind: Behind) -> Outcome:
     for first in range(0, count, CHUNK):
         ray = np.arange(first, min(first + CHUNK, count))
         steps = _steps(course, lit, ray, work)
-        found = _backwards(course, steps, behind.take(ray))
+        # Opacities above 1 make infinities, where rays have long ended.
+        with np.errstate(over="ignore", invalid="ignore"):
+            found = _backwards(course, steps, behind.take(ray))
         low[:, ray], high[:, ray], branch[ray] = found
     return Outcome(low, high, branch)
 

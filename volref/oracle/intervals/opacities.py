@@ -12,6 +12,9 @@ from volref.emulation.loop.opacity import OpacityRule
 from volref.oracle.intervals.finding import Finder, Reach
 from volref.oracle.intervals.walking import Course, Pair
 
+# A share of a step that is off by more than this share of itself is not one that roundings have moved.
+UNSURE = 1e-5
+
 
 class Share(NamedTuple):
     """What samples add: opacity (2, n) and straight colour (2, C, n) at the ends of the chord.
@@ -90,8 +93,8 @@ def _by_step(
             else (least[dark] + beside[dark]) ** middle
         )
     # d (x^s) / ds = x^s ln x, at most 1 / (e s); where a share of a step is not known, both are computed.
-    spread = spread + np.minimum(0.3679 * half / np.maximum(low, 1e-300), 1.0) * (half < 1e-3 * middle)
-    unsure = np.flatnonzero(np.broadcast_to(half >= 1e-3 * middle, beside.shape))
+    spread = spread + np.minimum(0.3679 * half / np.maximum(low, 1e-300), 1.0) * (half < UNSURE * middle)
+    unsure = np.flatnonzero(np.broadcast_to(half >= UNSURE * middle, beside.shape))
     if len(unsure) and np.size(half) > 1:
         base = clear[:, unsure]
         wide = np.abs(base ** low[unsure] - base ** high[unsure]).max(axis=0)

@@ -98,6 +98,8 @@ class Slopes:
         texels = self.texture.texels
         mode: Any = "edge" if self.texture.wrap == "clamp" else "wrap"
         pad = [(PAD * (size > 1),) * 2 for size in texels.shape[:-1]]
+        if texels.dtype == np.float16:  # what scipy.ndimage does not take
+            texels = texels.astype(np.float32)
         return np.moveaxis(np.pad(texels, [*pad, (0, 0)], mode=mode), -1, 0)
 
     @cached_property
