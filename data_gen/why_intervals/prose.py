@@ -16,6 +16,17 @@ COMMANDS = """
     $ python -m data_gen.why_intervals{webgl}
 """
 
+RESULT = """
+Rules that fail no correct image here catch {most} of the faults at most; no threshold of any of their
+measures would catch more than {hindsight} and still fail none. Rules that catch all faults fail {least}
+correct images at least. With the machine named, volref catches {known} and fails {known_failed}.
+
+For a set of machines there is a third verdict, a warning: *inside only with low-quality filtering*, by
+filters of 4 bits, which WebGL allows. {warned} images with a fault and {warned_right} correct ones get
+it; they count as passed above, as do {open_right} correct ones that are *not comparable*, where `accept`
+says what has to be known about the machine.
+"""
+
 FIGURE = """\
 ![Which criterion catches which fault](images/why-intervals.png)
 
@@ -63,6 +74,11 @@ For each measure, the strictest threshold that fails no correct image here, foun
 project could have known it.
 """
 
+BY_SCENE = """
+The same by `webgl-highp`, with the width that 99 % of its intervals do not exceed. Scenes where it rejects
+the machine that draws the faults, and so catches all of them: {alien}.
+"""
+
 WIDTHS = """
 How wide the intervals are before the canvas rounds, in 1/255: of half of the pixels at most p50, of 99 %
 at most p99; and how many of 100 pixels hang on a comparison. Each from the scene where it is least to
@@ -84,6 +100,9 @@ correct images are rejected: above, {any_failed} of {correct} by `webgl-highp`. 
 - Where a fault moves a number by less than correct machines differ, it passes, as it must. Where a pixel
 hangs on a comparison, such as whether a ray takes one more sample, its interval may be a whole sample
 wide.
+
+- A gradient next to 0 has no direction, and lights make of it what they like: in the lit scenes
+intervals are wide, and a set of machines is judged by little else.
 
 - If the machine never changes, equal bytes are the best rule of all, and the cheapest: they catch
 whatever shows. They fail {unequal} of the {correct} correct images here, all at once as soon as

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from data_gen.why_intervals.criteria import CRITERIA, RISES
+from data_gen.why_intervals.criteria import CRITERIA, RISES, Criterion
 from data_gen.why_intervals.records import Record
 
 # A fault is visible where it moves a byte of the same machine's picture by so much.  A difference of 1 is
@@ -30,11 +30,12 @@ class Tally:
     correct: int
 
 
+def _rejecting(criterion: Criterion) -> Callable[[Record], bool]:
+    return lambda record: not criterion.passes(record.measures)
+
+
 COLUMNS = (
-    *(
-        Column(one.name, one.rule, lambda record, passes=one.passes: not passes(record.measures))
-        for one in CRITERIA
-    ),
+    *(Column(one.name, one.rule, _rejecting(one)) for one in CRITERIA),
     Column("volref, any machine", "inside the intervals of a set", lambda record: record.any.caught),
     Column("volref", "inside the intervals of the machine", lambda record: record.known.caught),
 )
