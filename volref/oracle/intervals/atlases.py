@@ -3,40 +3,78 @@
 Where a place is so near to a slice that a machine may take it for the one before or behind, both are asked.
 """
 
+from collections.abc import Iterator
+from typing import TypeAlias
+
 import numpy as np
 
-from volref.arrays import Booleans, Floats, Indices
+from volref.arrays import Floats, Indices
 from volref.emulation.textures.slices import SlicePair, slice_pair
 from volref.oracle.intervals.fetching import fetched
 from volref.oracle.intervals.finding import Finder, Reach, classified, joined, value_of
 from volref.oracle.intervals.polar import polar_pairs
 from volref.workspace import Workspace
 
+# Numbers and how far they may be off.
+Known: TypeAlias = tuple[Floats, Floats]
 
-def between_slices(finder: Finder, position: Floats, radius: Floats, work: Workspace) -> Reach:
-    """Return what samples at positions (3, n) up to radii (n,) may find between two slices."""
-    volume, size = finder.textures.pipeline.volume, finder.textures.size
+
+def value_between_slices(finder: Finder, position: Floats, radius: Floats, work: Workspace) -> Known:
+    """Return values (n,) at positions (3, n) up to radii (n,) between two slices, and their errors (n,)."""
+    found: Known | None = None
+    for at, pair, reach in _pairs(finder, position, radius):
+        sides, share, share_off = _fetched_sides(finder, pair, reach, work)
+        one, two = (value_of(finder, *side) for side in sides)
+        value = _between(finder, one, two, share, share_off)
+        found = value if found is None else _either(found, value, at)
+    assert found is not None
+    return found
+
+
+def colors_between_slices(finder: Finder, position: Floats, radius: Floats, work: Workspace) -> Reach:
+    """Return what samples may find of slices that are classified before they are mixed."""
+    whole: Reach | None = None
+    for at, pair, reach in _pairs(finder, position, radius):
+        sides, share, share_off = _fetched_sides(finder, pair, reach, work)
+        if finder.textures.pipeline.table.order == "per-slice":
+            found = _per_slice(finder, sides, share, share_off, work)
+        else:
+            color, off = _between(finder, sides[0], sides[1], share, share_off)
+            found = Reach(np.stack([color, color]), off, color[3], off[3])
+        whole = found if whole is None else joined(whole, found, at)
+    assert whole is not None
+    return whole
+
+
+def _pairs(finder: Finder, position: Floats, radius: Floats) -> Iterator[tuple[Indices, SlicePair, Floats]]:
+    """Yield the slices around points, then those of the ones that may lie between others; and their radii."""
+    volume, size, tiles = finder.textures.pipeline.volume, finder.textures.size, finder.textures.tiles
     slices = size[2]
     off = radius * slices + 2 * finder.slack.control * slices
-    pair = slice_pair(volume, size, finder.textures.tiles, position)
+    pair = slice_pair(volume, size, tiles, position)
+    yield np.arange(len(radius)), pair, radius
     share = pair.share
     if volume.between == "x":
         share = _place_along_z(finder, position) - pair.first
-    found = _mixed(finder, pair, radius, work)
     near = np.flatnonzero((share <= off) | (share >= 1 - off))
-    if len(near):
-        for side in (-1, 1):
-            moved = position[:, near].copy()
-            moved[2] += (side * 2 * off[near] / slices).astype(moved.dtype)
-            other = slice_pair(volume, size, finder.textures.tiles, moved)
-            changed = np.flatnonzero(other.first != pair.first[near])
-            if len(changed):
-                taken = SlicePair(*(number[changed] for number in other))
-                at = near[changed]
-                found = joined(
-                    found, _mixed(finder, taken, 3 * radius[at] + 4 * finder.slack.control, work), at
-                )
-    return found
+    for side in (-1, 1) if len(near) else ():
+        moved = position[:, near].copy()
+        moved[2] += (side * 2 * off[near] / slices).astype(moved.dtype)
+        other = slice_pair(volume, size, tiles, moved)
+        changed = np.flatnonzero(other.first != pair.first[near])
+        if len(changed):
+            at = near[changed]
+            taken = SlicePair(*(number[changed] for number in other))
+            yield at, taken, 3 * radius[at] + 4 * finder.slack.control
+
+
+def _either(found: Known, other: Known, at: Indices) -> Known:
+    """Return values with what those at `at` may be too."""
+    value, off = (one.copy() for one in found)
+    low = np.minimum(value[at] - off[at], other[0] - other[1])
+    high = np.maximum(value[at] + off[at], other[0] + other[1])
+    value[at], off[at] = (low + high) / 2, (high - low) / 2
+    return value, off
 
 
 def _place_along_z(finder: Finder, position: Floats) -> Floats:
@@ -47,27 +85,19 @@ def _place_along_z(finder: Finder, position: Floats) -> Floats:
     return np.asarray(position[2] * kind(count - (switches.slices == "last")))
 
 
-def _mixed(finder: Finder, pair: SlicePair, radius: Floats, work: Workspace) -> Reach:
-    """Return what may be found between the slices of a pair, at places up to radii (n,) of texture space."""
-    textures = finder.textures
-    pipeline, texture = textures.pipeline, textures.volume
-    nx, ny, nz = textures.size
+def _fetched_sides(
+    finder: Finder, pair: SlicePair, radius: Floats, work: Workspace
+) -> tuple[list[Known], Floats, Floats]:
+    """Return what both slices of a pair hold at places up to radii, the share of the second, its error."""
+    nx, ny, nz = finder.textures.size
     # In texture space of the atlas: its tiles are smaller than the slices' own.
-    shrunk = radius * (max(nx, ny) / max(texture.sizes))
+    shrunk = radius * (max(nx, ny) / max(finder.textures.volume.sizes))
     sides = [
         fetched(finder.volume, [u, v], shrunk, finder.slack, work)
         for u, v in zip(pair[3::2], pair[4::2], strict=True)
     ]
     share_off = radius * nz + 2 * finder.slack.control * nz
-    share = pair.share.astype(np.float64)
-    if pipeline.table.order == "per-slice":
-        return _per_slice(finder, sides, share, share_off, work)
-    if pipeline.table.order == "pre":
-        found, off = _between(finder, sides[0], sides[1], share, share_off)
-        return Reach(np.stack([found, found]), off, found[3], off[3])
-    values = [value_of(finder, *side) for side in sides]
-    value, off = _between(finder, values[0], values[1], share, share_off)
-    return Reach(*classified(finder, value, off, work), value, off)
+    return sides, pair.share.astype(np.float64), share_off
 
 
 def _between(
@@ -97,49 +127,22 @@ def _per_slice(
     return Reach(np.stack([color, color]), beside, value, off)
 
 
-def between_sweeps(finder: Finder, position: Floats, radius: Floats, work: Workspace) -> Reach:
-    """Return what samples may find between two sweeps of a radar; 0 where none is seen."""
+def value_between_sweeps(finder: Finder, position: Floats, radius: Floats, work: Workspace) -> Known:
+    """Return values (n,) between two sweeps of a radar, 0 where none is seen, and how far they are off."""
     grid = finder.textures.grid
     assert grid is not None
-    whole: Reach | None = None
+    found: Known | None = None
     for at, pair, places, share_off, seen, unseen in polar_pairs(finder, grid, position, radius):
-        reach = _swept(finder, pair, places, share_off, work)
-        reach = _or_nothing(finder, reach, seen, unseen, work)
-        whole = reach if whole is None else joined(whole, reach, at)
-    assert whole is not None
-    return whole
-
-
-def _swept(finder: Finder, pair: SlicePair, places: Floats, share_off: Floats, work: Workspace) -> Reach:
-    """Return what may be found between the sweeps of a pair; places (n,): how far off in the image."""
-    sides = [
-        value_of(finder, *fetched(finder.volume, [u, v], places, finder.slack, work))
-        for u, v in zip(pair[3::2], pair[4::2], strict=True)
-    ]
-    share = np.nan_to_num(pair.share.astype(np.float64), posinf=0.0, neginf=0.0)
-    value, off = _between(finder, sides[0], sides[1], share, share_off)
-    return Reach(*classified(finder, value, off, work), value, off)
-
-
-def _or_nothing(finder: Finder, reach: Reach, seen: Booleans, unseen: Booleans, work: Workspace) -> Reach:
-    """Return what may be found where samples (n,) may be seen, may not be seen, or either."""
-    nothing = np.flatnonzero(unseen)
-    if not len(nothing):
-        return reach
-    zero = np.zeros(len(nothing))
-    ends, spread = classified(finder, zero, zero, work)
-    empty = Reach(ends, spread, zero, zero)
-    only = unseen & ~seen
-    at: Indices = np.flatnonzero(only)
-    chosen = only[nothing]
-    new_ends, new_spread = reach.ends.copy(), reach.spread.copy()
-    value, radius = reach.value.copy(), reach.radius.copy()
-    new_ends[:, :, at], new_spread[:, at] = ends[:, :, chosen], spread[:, chosen]
-    value[at], radius[at] = 0.0, 0.0
-    replaced = Reach(new_ends, new_spread, value, radius)
-    both = np.flatnonzero(unseen & seen)
-    rest = np.flatnonzero(seen[nothing])
-    if not len(both):
-        return replaced
-    either = Reach(empty.ends[:, :, rest], empty.spread[:, rest], zero[rest], zero[rest])
-    return joined(replaced, either, both)
+        sides = [
+            value_of(finder, *fetched(finder.volume, [u, v], places, finder.slack, work))
+            for u, v in zip(pair[3::2], pair[4::2], strict=True)
+        ]
+        share = np.nan_to_num(pair.share.astype(np.float64), posinf=0.0, neginf=0.0)
+        value, off = _between(finder, sides[0], sides[1], share, share_off)
+        low = np.where(unseen, np.minimum(value - off, 0.0), value - off)
+        high = np.where(unseen, np.maximum(value + off, 0.0), value + off)
+        low, high = np.where(seen, low, 0.0), np.where(seen, high, 0.0)
+        one = (low + high) / 2, (high - low) / 2
+        found = one if found is None else _either(found, one, at)
+    assert found is not None
+    return found

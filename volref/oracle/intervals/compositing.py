@@ -30,7 +30,7 @@ from volref.workspace import Workspace
 Results: TypeAlias = tuple[Floats, Floats, Floats]
 
 # Rays taken together: their samples are kept until the way back.
-CHUNK = 1 << 12
+CHUNK = 1 << 13
 
 
 class Step(NamedTuple):

@@ -58,9 +58,10 @@ def _linear(
     steep = fetch_steep(slopes.texture, place, work)
     moved = texels + slack.weight
     off = steep.slope * moved + 3 * slopes.mixed[:, None] * (moved * moved)
+    # A place beyond the border of its cell is on another slope, and so are the weights there.
     over = np.flatnonzero(steep.margin <= texels)
     if len(over):
-        off[:, over] += slopes.near[:, steep.cell[over]] * texels[over]
+        off[:, over] = np.maximum(off[:, over], slopes.near[:, steep.cell[over]] * 2 * moved[over])
     return steep.value, off, steep.slope
 
 

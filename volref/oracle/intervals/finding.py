@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from volref.arrays import Floats, Indices
+from volref.arrays import Booleans, Floats, Indices, Integers
 from volref.emulation.textures.lookup import Textures, read_at
 from volref.emulation.textures.uploads import table_place
 from volref.oracle.intervals.fetching import fetched
@@ -76,6 +76,16 @@ class Finder:
         return np.ascontiguousarray(self.textures.table.texels[0].T.astype(np.float64))
 
     @cached_property
+    def visible(self) -> Integers:
+        """How many of the first k entries of a table of one row have an opacity (size + 1,)."""
+        return np.concatenate([[0], np.cumsum(self.entries[3] != 0)])
+
+    @cached_property
+    def brightest(self) -> float:
+        """The largest size of a colour in the table, at least 1."""
+        return max(1.0, float(np.abs(self.textures.table.texels[..., :3]).max(initial=0.0)))
+
+    @cached_property
     def padded(self) -> tuple[Floats, Floats]:
         """Entries (4, size + 2) with the outer ones twice, and the steps from each to the next."""
         entries = np.pad(self.entries, ((0, 0), (1, 1)), mode="edge")
@@ -106,10 +116,11 @@ def classified(finder: Finder, value: Floats, radius: Floats, work: Workspace) -
     else:
         half = np.full(len(value), 0.5)
         ends = np.stack([fetch(table, (place, half), work) for place in places])
-    largest = np.maximum(np.abs(ends[0]), np.abs(ends[1]))
-    spread = ROUNDINGS * finder.slack.values * largest
+    # Opacities of 0 are exactly that; what a colour is off by counts with its opacity.
+    spread = np.full(ends[0].shape, ROUNDINGS * finder.slack.values * finder.brightest)
+    spread[3] = ROUNDINGS * finder.slack.values * np.maximum(np.abs(ends[0, 3]), np.abs(ends[1, 3]))
     if finder.srgb:
-        spread[:3] += finder.srgb * (largest[:3] > 0)
+        spread[:3] += finder.srgb
     low, high = (place * size - 0.5 for place in places)
     if table.filter == "nearest":
         low, high = np.floor(low + 0.5), np.floor(high + 0.5)
@@ -185,23 +196,71 @@ def classified_2d(
     return np.stack([found, found]), beside
 
 
-def find(finder: Finder, position: Floats, radius: Floats, work: Workspace) -> Reach:
-    """Return what samples at positions (3, n), each up to a radius (n,), may find."""
+def find(finder: Finder, position: Floats, radius: Floats, work: Workspace) -> tuple[Reach, Indices]:
+    """Return what samples at positions (3, n), up to radii (n,), may find, and which of them may show.
+
+    What is found is that of the ones that may show alone.
+    """
     from volref.oracle.intervals import atlases, gradients
 
     textures = finder.textures
+    pipeline = textures.pipeline
+    # Without slices there is nothing to classify before they are mixed.
+    late = pipeline.table.order == "post" or (pipeline.table.order, pipeline.volume.layout) == (
+        "per-slice",
+        "3d",
+    )
+    if late and not gradients.has_texture(pipeline):
+        value, off = value_at(finder, position, radius, work)
+        some = np.flatnonzero(_may_show(finder, value, off))
+        value, off = value[some], off[some]
+        return Reach(*classified(finder, value, off, work), value, off), some
+    position, radius = _read(finder, position, radius)
+    if pipeline.volume.layout == "atlas":
+        reach = atlases.colors_between_slices(finder, position, radius, work)
+    else:
+        found, off = fetched(finder.volume, position, radius, finder.slack, work)
+        if pipeline.table.order == "pre":
+            reach = Reach(np.stack([found, found]), off, found[3], off[3])
+        else:
+            value, beside = value_of(finder, found, off)
+            reach = gradients.with_gradient(finder, value, beside, found[1:], off[1:], work)
+    some = np.flatnonzero(_shows(reach, pipeline.opacity.source))
+    return reach.take(some), some
+
+
+def value_at(finder: Finder, position: Floats, radius: Floats, work: Workspace) -> tuple[Floats, Floats]:
+    """Return values (n,) at positions (3, n) up to radii (n,), and how far they may be off (n,)."""
+    from volref.oracle.intervals import atlases
+
+    textures = finder.textures
     if textures.grid is not None:
-        return atlases.between_sweeps(finder, position, radius, work)
+        return atlases.value_between_sweeps(finder, position, radius, work)
     position, radius = _read(finder, position, radius)
     if textures.pipeline.volume.layout == "atlas":
-        return atlases.between_slices(finder, position, radius, work)
-    found, off = fetched(finder.volume, position, radius, finder.slack, work)
-    if textures.pipeline.table.order == "pre":
-        return Reach(np.stack([found, found]), off, found[3], off[3])
-    value, reach = value_of(finder, found, off)
-    if gradients.has_texture(textures.pipeline):
-        return gradients.with_gradient(finder, value, reach, found[1:], off[1:], work)
-    return Reach(*classified(finder, value, reach, work), value, reach)
+        return atlases.value_between_slices(finder, position, radius, work)
+    return value_of(finder, *fetched(finder.volume, position, radius, finder.slack, work))
+
+
+def _may_show(finder: Finder, value: Floats, radius: Floats) -> Booleans:
+    """Tell which values (n,) up to radii may have an opacity."""
+    if finder.textures.pipeline.opacity.source == "value":
+        return np.asarray((value != 0) | (radius > 0))
+    if finder.textures.table.texels.shape[0] > 1:
+        return np.ones(len(value), np.bool_)
+    size, counts = finder.entries.shape[1], finder.visible
+    # Two entries more than are fetched, for whatever rounds a place.
+    off = (radius + 4 * finder.slack.values) * size + finder.slack.weight + 1.5
+    place = table_place(finder.textures.pipeline.table, value) * size - 0.5
+    first, last = (np.clip(place + side * off, 0, size - 1).astype(np.int32) for side in (-1, 1))
+    return np.asarray(counts[last + 1] > counts[first])
+
+
+def _shows(reach: Reach, source: str) -> Booleans:
+    """Tell which samples (n,) may have any opacity."""
+    if source == "value":
+        return np.asarray((reach.value != 0) | (reach.radius > 0))
+    return np.asarray((reach.ends[0, 3] != 0) | (reach.ends[1, 3] != 0) | (reach.spread[3] > 0))
 
 
 def _read(finder: Finder, position: Floats, radius: Floats) -> tuple[Floats, Floats]:

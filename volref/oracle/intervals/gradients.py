@@ -9,7 +9,7 @@ from volref.emulation.drawing import Drawing
 from volref.emulation.loop.shading import FLAT, Lights, Place, answered, lights_of, place_of
 from volref.emulation.pipeline import Pipeline
 from volref.emulation.textures.gradient_volume import has_gradient_volume, unpacked
-from volref.oracle.intervals.finding import Finder, Reach, classified, classified_2d, find
+from volref.oracle.intervals.finding import Finder, Reach, classified, classified_2d, value_at
 from volref.scene.transform import transform_points
 from volref.stages.gradients import in_world, length_and_direction
 from volref.stages.lighting import lit_colors
@@ -144,11 +144,11 @@ def _gradient(
         for way in (-1, 1) if central else (1,):
             place = position.copy()
             place[axis] += kind(way / size)
-            sides.append(find(finder, place, radius + 2 * finder.slack.control, work))
+            sides.append(value_at(finder, place, radius + 2 * finder.slack.control, work))
         if central:
-            gradient[axis] = (sides[0].value - sides[1].value) / 2
-            off = np.hypot(off, (sides[0].radius + sides[1].radius) / 2)
+            gradient[axis] = (sides[0][0] - sides[1][0]) / 2
+            off = np.hypot(off, (sides[0][1] + sides[1][1]) / 2)
         else:
-            gradient[axis] = reach.value - sides[0].value
-            off = np.hypot(off, reach.radius + sides[0].radius)
+            gradient[axis] = reach.value - sides[0][0]
+            off = np.hypot(off, reach.radius + sides[0][1])
     return gradient, off, off

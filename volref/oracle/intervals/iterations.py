@@ -10,7 +10,7 @@ import numpy as np
 
 from volref.arrays import Booleans, Floats, Indices
 from volref.oracle.intervals import gradients
-from volref.oracle.intervals.finding import Reach, find
+from volref.oracle.intervals.finding import find
 from volref.oracle.intervals.gradients import Lit
 from volref.oracle.intervals.opacities import Share, share_of
 from volref.oracle.intervals.walking import (
@@ -27,6 +27,9 @@ from volref.oracle.intervals.walking import (
     place_of,
 )
 from volref.workspace import Workspace
+
+# Rays that have ended are dropped when they are more than this share.
+MOST_OVER = 0.1
 
 # Samples looked up together; more leave the second-level cache.
 BLOCK = 1 << 14
@@ -53,6 +56,7 @@ class _Placed(NamedTuple):
     number: int
     at: Indices
     ray: Indices
+    over: Booleans
     before: Test
     hit: Test | None
     after: Test
@@ -77,17 +81,14 @@ def iterations(
                 samples += len(one.radius)
                 number += 1
             yield from _looked_up(course, lit, placed, work)
-            kept = np.flatnonzero(~gone[at])
-            if len(kept) < len(at):
-                walk.take(kept)
-                at = at[kept]
+            at = _left(walk, at, walk.over | gone[at])
 
 
 def _placed(course: Course, walk: Walk, at: Indices, number: int) -> tuple[_Placed, Indices]:
     """Return the next iteration of a walk, and which rays of the chunk go on after it."""
     before = ended_before(course, walk, number)
     hit = met(course, walk)
-    over = before.sure if hit is None else before.sure | hit.sure
+    over = walk.over | (before.sure if hit is None else before.sure | hit.sure)
     here = walk.ray
     position, radius, part = place_of(course, walk, number)
     if over.any():
@@ -97,13 +98,19 @@ def _placed(course: Course, walk: Walk, at: Indices, number: int) -> tuple[_Plac
     sampled = walk.position
     advanced(course, walk)
     after = own_end_after(course, walk, sampled)
-    one = _Placed(number, at, here, before, hit, after, position, radius, part)
-    done = over | after.sure
-    if done.any():
-        kept = np.flatnonzero(~done)
-        walk.take(kept)
-        at = at[kept]
-    return one, at
+    one = _Placed(number, at, here, over, before, hit, after, position, radius, part)
+    return one, _left(walk, at, over | after.sure)
+
+
+def _left(walk: Walk, at: Indices, over: Booleans) -> Indices:
+    """Put down which rays are over, and drop them where they are many; return those that are left."""
+    walk.over = over
+    done = np.count_nonzero(over)
+    if done <= MOST_OVER * len(over) and done < len(over):
+        return at
+    kept = np.flatnonzero(~over)
+    walk.take(kept)
+    return at[kept]
 
 
 def _looked_up(
@@ -115,12 +122,11 @@ def _looked_up(
     ray = np.concatenate([one.ray for one in placed])
     part = _joined_parts([one.part for one in placed])
     skipped = course.drawing.pipeline.stepping.skipped
-    over = np.concatenate(
-        [one.before.sure | (one.number < skipped) | (one.hit is not None and one.hit.sure) for one in placed]
-    )
-    reach = find(course.finder, position, radius, work)
-    some = np.flatnonzero(~over & visible(course, reach))
-    chosen = reach.take(some)
+    over = np.concatenate([one.over | (one.number < skipped) for one in placed])
+    chosen, some = find(course.finder, position, radius, work)
+    if over.any():
+        left = np.flatnonzero(~over[some])
+        chosen, some = chosen.take(left), some[left]
     if lit is not None:
         chosen = gradients.shaded(lit, course.finder, position[:, some], chosen, ray[some], radius[some])
     share = share_of(course, chosen, ray[some], None if part is None else part.take(some))
@@ -131,17 +137,6 @@ def _looked_up(
         yield Iteration(
             one.at, one.before, one.hit, one.after, some[part_of] - counts[k], share.part(part_of)
         )
-
-
-def visible(course: Course, reach: Reach) -> Booleans:
-    """Tell which samples (n,) may have any opacity, or change what is there without."""
-    accumulation = course.drawing.pipeline.accumulation
-    if accumulation.rule == "reversed-over" or accumulation.color == "premultiplied":
-        # A transparent sample makes A C of C, C = a c + (1 - a) A C, or adds its c without an a.
-        return np.ones(len(reach.value), np.bool_)
-    if course.drawing.rule.source == "value":
-        return np.asarray((reach.value != 0) | (reach.radius > 0))
-    return np.asarray((reach.ends[0, 3] != 0) | (reach.ends[1, 3] != 0) | (reach.spread[3] > 0))
 
 
 def _joined_parts(parts: list[Pair | None]) -> Pair | None:

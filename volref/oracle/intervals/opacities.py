@@ -92,8 +92,10 @@ def _by_step(
             if middle.size > 1
             else (least[dark] + beside[dark]) ** middle
         )
-    # d (x^s) / ds = x^s ln x, at most 1 / (e s); where a share of a step is not known, both are computed.
-    spread = spread + np.minimum(0.3679 * half / np.maximum(low, 1e-300), 1.0) * (half < UNSURE * middle)
+    # s d (x^s) / ds = T ln T with T = x^s, at most 1 / e and at most 1 - T (and a thousandth more for a share
+    # that is off by as much); where a share of a step is not known, both are computed.
+    steepest = np.minimum(0.3679, 1.002 * (1 - left.min(axis=0)) + UNSURE * half)
+    spread = spread + np.minimum(steepest * half / np.maximum(low, 1e-300), 1.0) * (half < UNSURE * middle)
     unsure = np.flatnonzero(np.broadcast_to(half >= UNSURE * middle, beside.shape))
     if len(unsure) and np.size(half) > 1:
         base = clear[:, unsure]

@@ -44,7 +44,12 @@ class Slopes:
     @cached_property
     def mixed(self) -> Floats:
         """Bound (C,) of the mixed differences: twice the steepest slope, as an edge's differs by that."""
-        return np.asarray(2 * self.near.max(axis=1))
+        return np.asarray(2 * self.steepest)
+
+    @cached_property
+    def steepest(self) -> Floats:
+        """The steepest slope (C,)."""
+        return np.asarray(self.near.max(axis=1))
 
     @cached_property
     def largest(self) -> Floats:

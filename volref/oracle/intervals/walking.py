@@ -14,7 +14,7 @@ import numpy as np
 
 from volref.arrays import Booleans, Floats, Indices
 from volref.emulation.drawing import Drawing
-from volref.emulation.loop.marching import LONGEST_LOOP, Cut
+from volref.emulation.loop.marching import LONGEST_LOOP
 from volref.oracle.intervals.finding import Finder
 from volref.oracle.intervals.rays import Rays
 from volref.oracle.intervals.slack import UNIT
@@ -54,19 +54,28 @@ def around(middle: Floats, off: Floats) -> Pair:
 
 @dataclass(eq=False)
 class Walk:
-    """Rays on their way: which they are, and the pairs that change from iteration to iteration."""
+    """Rays on their way: which they are, their paths, and pairs that change from iteration to iteration.
+
+    over (n,): those that have ended, and are still there.  delta, step, deeper: what position, walked and
+    depth change by.  surface: the depth at which rays meet a mesh.
+    """
 
     ray: Indices
+    over: Booleans
+    walks: Walks
     position: Pair
     delta: Pair
     walked: Pair
+    step: Pair
     depth: Pair
+    deeper: Pair
+    surface: Pair
     offset: Pair
 
     def take(self, at: Indices) -> None:
         """Keep some of the rays."""
-        self.ray = self.ray[at]
-        for name in ("position", "delta", "walked", "depth", "offset"):
+        self.ray, self.over, self.walks = self.ray[at], self.over[at], self.walks.take(at)
+        for name in ("position", "delta", "walked", "step", "depth", "deeper", "surface", "offset"):
             setattr(self, name, getattr(self, name).take(at))
 
 
@@ -83,9 +92,9 @@ class Course:
 
 def begun(course: Course, ray: Indices) -> Walk:
     """Return the walk of some rays before their first iteration."""
-    stepping, walks, unit = course.drawing.pipeline.stepping, course.walks, course.finder.slack.control
-    paths, offset = walks.paths.take(ray), course.offset.take(ray)
-    entry_off = walks.entry_off[ray]
+    stepping, unit = course.drawing.pipeline.stepping, course.finder.slack.control
+    walks, offset = course.walks.take(ray), course.offset.take(ray)
+    paths, entry_off = walks.paths, walks.entry_off
     position = around(paths.entry, entry_off)
     walked = Pair(np.zeros_like(paths.length), np.zeros_like(paths.length))
     if stepping.advance == "parameter":
@@ -95,18 +104,21 @@ def begun(course: Course, ray: Indices) -> Walk:
     elif stepping.advance == "add":
         middle = (offset.low + offset.high) / 2
         step = np.abs(paths.delta).max(axis=0).astype(np.float64)
-        off = entry_off + (offset.high - offset.low) / 2 * step + walks.delta_off[ray] * offset.high
+        off = entry_off + (offset.high - offset.low) / 2 * step + walks.delta_off * offset.high
         off = off + np.where(off > 0, 4 * unit, 0.0)
         position = around(paths.entry + paths.delta * middle.astype(paths.delta.dtype), off)
         if course.drawing.pipeline.rays.kind != "slab" and course.drawing.device.freedom == "rounded":
             position = _on_faces(paths.entry, position)
     if stepping.end == "length-left":
-        walked = around(paths.length, walks.length_off[ray])
-    depth = walked
-    if course.rays.cut is not None and course.rays.cut_off is not None:
-        depth = around(course.rays.cut.depth[ray], course.rays.cut_off.depth[ray])
-    delta = around(paths.delta, np.broadcast_to(walks.delta_off[ray], paths.delta.shape))
-    return Walk(ray, position, delta, walked, depth, offset)
+        walked = around(paths.length, walks.length_off)
+    delta = around(paths.delta, np.broadcast_to(walks.delta_off, paths.delta.shape))
+    step = around(paths.step, walks.step_off)
+    depth = deeper = surface = walked
+    cut, off = course.rays.cut, course.rays.cut_off
+    if cut is not None and off is not None:
+        depth, deeper, surface = (around(one[ray], by[ray]) for one, by in zip(cut[:3], off[:3], strict=True))
+    over = np.zeros(len(ray), np.bool_)
+    return Walk(ray, over, walks, position, delta, walked, step, depth, deeper, surface, offset)
 
 
 def _on_faces(entry: Floats, position: Pair) -> Pair:
@@ -121,22 +133,21 @@ def _on_faces(entry: Floats, position: Pair) -> Pair:
 
 def place_of(course: Course, walk: Walk, number: int) -> tuple[Floats, Floats, Pair | None]:
     """Return positions (3, n), their radius (n,), and for what share of a whole step they stand."""
-    stepping, walks, unit = course.drawing.pipeline.stepping, course.walks, course.finder.slack.control
-    ray = walk.ray
+    stepping, walks, unit = course.drawing.pipeline.stepping, walk.walks, course.finder.slack.control
     if stepping.advance == "add":
         low, high = walk.position
         kind = low.dtype.type
         return (low + high) * kind(0.5), _half_width(low, high, unit), None
     paths = walks.paths
-    entry, entry_off = paths.entry[:, ray], walks.entry_off[ray]
+    entry, entry_off = paths.entry, walks.entry_off
     if stepping.advance == "parameter":
         kind = entry.dtype.type
         t = (walk.walked.low + walk.walked.high) * kind(0.5)
-        along = paths.exit[:, ray] - entry
+        along = paths.exit - entry
         half = (walk.walked.high - walk.walked.low) / 2
-        radius = np.maximum(entry_off, walks.exit_off[ray]) + np.abs(along).max(axis=0) * half + 6 * unit
+        radius = np.maximum(entry_off, walks.exit_off) + np.abs(along).max(axis=0) * half + 6 * unit
         return entry + along * t, radius, None
-    left = _left(course, ray, number)
+    left = _left(course, walks, number)
     share = part = None if left is None else Pair(*(np.clip(side, 0.0, 1.0) for side in left))
     if left is not None and share is not None and stepping.last_step == "doubled":
         part = _doubled(left, share)
@@ -145,12 +156,11 @@ def place_of(course: Course, walk: Walk, number: int) -> tuple[Floats, Floats, P
     if share is not None:
         whole = (share.low + share.high) / 2
         half, middle = half * whole + middle * (share.high - share.low) / 2, middle * whole
-    delta = paths.delta[:, ray]
+    delta = paths.delta
     kind = delta.dtype.type
     position = entry + delta * (kind(number) + middle).astype(delta.dtype)
-    step = paths.texture_step[ray]
     # A place on the machine's own line, a known distance behind its entry.
-    radius = walks.path_off[ray] + step * half + 8 * unit
+    radius = walks.path_off + paths.texture_step * half + 8 * unit
     return position, radius, part
 
 
@@ -161,14 +171,14 @@ def _half_width(low: Floats, high: Floats, unit: float) -> Floats:
     return np.asarray(wide * wide.dtype.type(0.5) + np.where(wide > 0, 2 * unit, 0.0))
 
 
-def _left(course: Course, ray: Indices, number: int) -> Pair | None:
+def _left(course: Course, walks: Walks, number: int) -> Pair | None:
     """Return how many steps are left of rays before iteration `number`; None where every step is whole."""
-    stepping, walks = course.drawing.pipeline.stepping, course.walks
+    stepping = course.drawing.pipeline.stepping
     if stepping.last_step not in ("partial", "doubled") or stepping.end != "length-before":
         return None
-    step = walks.paths.step[ray].astype(np.float64)
-    left = walks.paths.length[ray].astype(np.float64) - number * step
-    off = walks.length_off[ray]
+    step = walks.paths.step.astype(np.float64)
+    left = walks.paths.length.astype(np.float64) - number * step
+    off = walks.length_off
     return Pair(*((left + side * off) / step for side in (-1, 1)))
 
 
@@ -182,55 +192,49 @@ def _doubled(left: Pair, share: Pair) -> Pair:
 
 def advanced(course: Course, walk: Walk) -> None:
     """Go a step on."""
-    stepping, walks, ray = course.drawing.pipeline.stepping, course.walks, walk.ray
-    paths = walks.paths
+    stepping = course.drawing.pipeline.stepping
     if stepping.advance == "add":
         walk.position = walk.position.plus(walk.delta)
-    counted = (
-        stepping.end == "length-left" or stepping.end == "length-after" or stepping.advance == "parameter"
-    )
-    if counted:
-        step = around(paths.step[ray], walks.step_off[ray])
-        if stepping.end == "length-left":
-            walk.walked = Pair(walk.walked.low - step.high, walk.walked.high - step.low)
-        else:
-            walk.walked = walk.walked.plus(step)
+    if stepping.end == "length-left":
+        walk.walked = Pair(walk.walked.low - walk.step.high, walk.walked.high - walk.step.low)
+    elif stepping.end == "length-after" or stepping.advance == "parameter":
+        walk.walked = walk.walked.plus(walk.step)
 
 
 def ended_before(course: Course, walk: Walk, number: int) -> Test:
     """Tell which rays end before iteration `number`."""
-    stepping, ray = course.drawing.pipeline.stepping, walk.ray
-    paths = course.walks.paths
+    stepping, walks = course.drawing.pipeline.stepping, walk.walks
+    paths = walks.paths
     if stepping.end == "count":
-        count, more = paths.count[ray], course.walks.count_off[ray]
+        count, more = paths.count, walks.count_off
         return Test(number >= count + more, number >= count - more)
     if stepping.end == "parameter":
         return Test(~(walk.walked.low < 1), ~(walk.walked.high < 1))
     if stepping.end == "length-left":
         return Test(~(walk.walked.high > 0), ~(walk.walked.low > 0))
     if stepping.end == "length-before":
-        length, off = paths.length[ray].astype(np.float64), course.walks.length_off[ray]
-        begin = (paths.step.dtype.type(number) * paths.step[ray]).astype(np.float64)
+        length, off = paths.length.astype(np.float64), walks.length_off
+        begin = (paths.step.dtype.type(number) * paths.step).astype(np.float64)
         if stepping.last_step == "dropped":
-            begin = begin + paths.step[ray]
+            begin = begin + paths.step
             return Test(begin > length + off, begin > length - off)
         return Test(~(begin < length + off), ~(begin < length - off))
-    nowhere = np.zeros(len(ray), np.bool_)
+    nowhere = np.zeros(len(walk.ray), np.bool_)
     return Test(nowhere, nowhere)
 
 
 def own_end_after(course: Course, walk: Walk, sampled: Pair) -> Test:
     """Tell which rays end after a sample at `sampled` by where they are, or by how far they have gone."""
-    end, ray, (low, high) = course.drawing.pipeline.stepping.end, walk.ray, walk.position
+    end, (low, high) = course.drawing.pipeline.stepping.end, walk.position
     if end == "length-after":
-        length, off = course.walks.paths.length[ray], course.walks.length_off[ray]
+        length, off = walk.walks.paths.length, walk.walks.length_off
         return Test(np.asarray(walk.walked.low >= length + off), np.asarray(walk.walked.high >= length - off))
     if end == "outside":
         sure, maybe = (low > 1) | (high < 0), (high > 1) | (low < 0)
         return Test(np.any(sure, axis=0), np.any(maybe, axis=0))
     if end == "outside-above":
         return Test(np.any(sampled.low > 1, axis=0), np.any(sampled.high > 1, axis=0))
-    nowhere = np.zeros(len(ray), np.bool_)
+    nowhere = np.zeros(len(walk.ray), np.bool_)
     return Test(nowhere, nowhere)
 
 
@@ -245,11 +249,10 @@ def opaque(course: Course, alpha: Pair, threshold: float) -> Test:
 
 def met(course: Course, walk: Walk) -> Test | None:
     """Tell which rays reach a surface before the sample that they would take now, and go a step on."""
-    cut, off = course.rays.cut, course.rays.cut_off
-    if cut is None or off is None:
+    cut = course.rays.cut
+    if cut is None:
         return None
-    ray = walk.ray
-    step, surface = around(cut.step[ray], off.step[ray]), _surface(cut, off, ray)
+    step, surface = walk.deeper, walk.surface
     if cut.early:
         sure = walk.depth.low - surface.high > -step.low
         maybe = walk.depth.high - surface.low > -step.high
@@ -257,10 +260,6 @@ def met(course: Course, walk: Walk) -> Test | None:
         sure, maybe = walk.depth.low >= surface.high, walk.depth.high >= surface.low
     walk.depth = walk.depth.plus(step)
     return Test(sure, maybe)
-
-
-def _surface(cut: Cut, off: Cut, ray: Indices) -> Pair:
-    return around(cut.surface[ray], off.surface[ray])
 
 
 def most_iterations(course: Course) -> int:

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from volref.arrays import Floats, Integers
+from volref.arrays import Floats, Indices, Integers
 from volref.emulation.drawing import Drawing
 from volref.emulation.rays.paths import Paths, paths_of
 from volref.oracle.intervals.rays import Rays
@@ -30,6 +30,11 @@ class Walks:
     step_off: Floats
     count_off: Integers
     relative: Floats
+
+    def take(self, chosen: Indices) -> "Walks":
+        """Return those of some of the rays."""
+        offs = (getattr(self, name)[chosen] for name in self.__dataclass_fields__ if name != "paths")
+        return Walks(self.paths.take(chosen), *offs)
 
 
 def walks_of(rays: Rays, drawing: Drawing, slack: Slack) -> Walks:
