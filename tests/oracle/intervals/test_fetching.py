@@ -19,7 +19,7 @@ KINDS = {
     "nearest": {"filter": "nearest"},
     "nearest, cut": {"filter": "nearest", "nearest_bits": 16},
 }
-SHAPES = ((6, 5, 1), (1, 9, 4), (5, 4, 7, 2), (3, 1, 4, 1))
+SHAPES = ((6, 5, 1), (1, 9, 4), (5, 4, 7, 2), (3, 1, 4, 1), (1, 1, 1, 1))
 POINTS, MOVES = 40, 12
 
 # The rounding of the sums that this file itself makes.

@@ -166,8 +166,9 @@ def _steep_channel(
         derivatives = [_mixed(along, weight) for along in derivatives]
         derivatives.append(steps)
         found = found[::2]
-    np.abs(derivatives[0][0], out=slope)
-    for along in derivatives[1:]:
+    # One texel has no slope.
+    slope[...] = 0
+    for along in derivatives:
         slope += np.abs(along[0])
 
 
