@@ -57,6 +57,7 @@ if TYPE_CHECKING:
     from volref.oracle.acceptance import Acceptance
     from volref.oracle.acceptance_files import load_acceptance, save_acceptance
     from volref.oracle.accepting import accept
+    from volref.oracle.budgeting import Budget, budget
     from volref.oracle.explanation import Explanation, explain
     from volref.oracle.faults.fault import Subject
     from volref.oracle.metrics import Comparison, compare
@@ -99,6 +100,7 @@ __version__ = "0.1.0"
 __all__ = [
     "Acceptance",
     "AtlasLayout",
+    "Budget",
     "Bundle",
     "Camera",
     "Candidates",
@@ -130,6 +132,7 @@ __all__ = [
     "accept",
     "arcball_rotation",
     "axis_slice",
+    "budget",
     "cappi",
     "check",
     "check_bundle",
@@ -203,6 +206,7 @@ _HOMES = {
     "volref.oracle.acceptance": ("Acceptance",),
     "volref.oracle.acceptance_files": ("load_acceptance", "save_acceptance"),
     "volref.oracle.accepting": ("accept",),
+    "volref.oracle.budgeting": ("Budget", "budget"),
     "volref.oracle.faults.fault": ("Subject",),
     "volref.oracle.explanation": ("Explanation", "explain"),
     "volref.oracle.metrics": ("Comparison", "compare"),

@@ -2,6 +2,7 @@
 
 import json
 import os
+import shlex
 import signal
 import subprocess
 import sys
@@ -60,7 +61,7 @@ def test_the_examples_of_a_verb_can_be_parsed(verb):
 
     parser, _ = build_parser()
     for line, _ in verb.examples:
-        words = line.split(" > ")[0].split()
+        words = shlex.split(line.split(" > ")[0])
         assert parser.parse_args(words).run is verb.run
 
 

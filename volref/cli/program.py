@@ -14,6 +14,7 @@ from typing import NoReturn
 
 from volref.cli import (
     accept,
+    budget,
     charts,
     check,
     compare,
@@ -45,6 +46,7 @@ VERBS = (
     emulate.VERB,
     pipelines.VERB,
     accept.VERB,
+    budget.VERB,
     check.VERB,
     explain.VERB,
     compare.VERB,
