@@ -8,15 +8,14 @@ share one place in it: they are kept together, as the two ends of the curve's ch
 chord, not as a box of their ranges, which can be almost twice as wide.
 """
 
-import dataclasses
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
-from volref.arrays import Booleans, Floats, Indices, Integers
-from volref.emulation.textures.lookup import Textures, read_at
+from volref.arrays import Floats, Indices, Integers
+from volref.emulation.textures.lookup import Textures
 from volref.emulation.textures.uploads import table_place
 from volref.oracle.intervals.fetching import fetched
 from volref.oracle.intervals.slack import Slack
@@ -194,90 +193,6 @@ def classified_2d(
     off = np.maximum(radius, reach) + 2 * finder.slack.values
     found, beside = fetched(slopes, [place, magnitude], off, finder.slack, work)
     return np.stack([found, found]), beside
-
-
-def find(finder: Finder, position: Floats, radius: Floats, work: Workspace) -> tuple[Reach, Indices]:
-    """Return what samples at positions (3, n), up to radii (n,), may find, and which of them may show.
-
-    What is found is that of the ones that may show alone.
-    """
-    from volref.oracle.intervals import atlases, gradients
-
-    textures = finder.textures
-    pipeline = textures.pipeline
-    # Without slices there is nothing to classify before they are mixed.
-    late = pipeline.table.order == "post" or (pipeline.table.order, pipeline.volume.layout) == (
-        "per-slice",
-        "3d",
-    )
-    if late and not gradients.has_texture(pipeline):
-        value, off = value_at(finder, position, radius, work)
-        some = np.flatnonzero(_may_show(finder, value, off))
-        value, off = value[some], off[some]
-        return Reach(*classified(finder, value, off, work), value, off), some
-    position, radius = _read(finder, position, radius)
-    if pipeline.volume.layout == "atlas":
-        reach = atlases.colors_between_slices(finder, position, radius, work)
-    else:
-        found, off = fetched(finder.volume, position, radius, finder.slack, work)
-        if pipeline.table.order == "pre":
-            reach = Reach(np.stack([found, found]), off, found[3], off[3])
-        else:
-            value, beside = value_of(finder, found, off)
-            reach = gradients.with_gradient(finder, value, beside, found[1:], off[1:], work)
-    some = np.flatnonzero(_shows(reach, pipeline.opacity.source))
-    return reach.take(some), some
-
-
-def value_at(finder: Finder, position: Floats, radius: Floats, work: Workspace) -> tuple[Floats, Floats]:
-    """Return values (n,) at positions (3, n) up to radii (n,), and how far they may be off (n,)."""
-    from volref.oracle.intervals import atlases
-
-    textures = finder.textures
-    if textures.grid is not None:
-        return atlases.value_between_sweeps(finder, position, radius, work)
-    position, radius = _read(finder, position, radius)
-    if textures.pipeline.volume.layout == "atlas":
-        return atlases.value_between_slices(finder, position, radius, work)
-    return value_of(finder, *fetched(finder.volume, position, radius, finder.slack, work))
-
-
-def _may_show(finder: Finder, value: Floats, radius: Floats) -> Booleans:
-    """Tell which values (n,) up to radii may have an opacity."""
-    if finder.textures.pipeline.opacity.source == "value":
-        return np.asarray((value != 0) | (radius > 0))
-    if finder.textures.table.texels.shape[0] > 1:
-        return np.ones(len(value), np.bool_)
-    size, counts = finder.entries.shape[1], finder.visible
-    # Two entries more than are fetched, for whatever rounds a place.
-    off = (radius + 4 * finder.slack.values) * size + finder.slack.weight + 1.5
-    place = table_place(finder.textures.pipeline.table, value) * size - 0.5
-    first, last = (np.clip(place + side * off, 0, size - 1).astype(np.int32) for side in (-1, 1))
-    return np.asarray(counts[last + 1] > counts[first])
-
-
-def _shows(reach: Reach, source: str) -> Booleans:
-    """Tell which samples (n,) may have any opacity."""
-    if source == "value":
-        return np.asarray((reach.value != 0) | (reach.radius > 0))
-    return np.asarray((reach.ends[0, 3] != 0) | (reach.ends[1, 3] != 0) | (reach.spread[3] > 0))
-
-
-def _read(finder: Finder, position: Floats, radius: Floats) -> tuple[Floats, Floats]:
-    """Return where samples at positions (3, n) are read in the texture, and up to what radii (n,)."""
-    switches, size = finder.textures.pipeline.volume, finder.textures.size
-    place = read_at(switches, size, position)
-    if place is position:
-        return position, radius
-    off = radius + 4 * finder.slack.control * (1 + np.abs(switches.shift) / min(size))
-    if switches.brick is not None:
-        # Read from the other brick, a place near the border of two lies up to a voxel further.
-        count = np.array(size, np.float64)[:, None]
-        whole = read_at(dataclasses.replace(switches, brick=None), size, position)
-        side = whole * count / switches.brick
-        near = np.abs(side - np.rint(side)) * switches.brick <= off * count
-        off = off + np.where(near, 1 / count, 0.0).max(axis=0)
-    return place, off
 
 
 def value_of(finder: Finder, channels: Floats, off: Floats) -> tuple[Floats, Floats]:

@@ -9,7 +9,9 @@ from volref.emulation.drawing import Drawing
 from volref.emulation.loop.shading import FLAT, Lights, Place, answered, lights_of, place_of
 from volref.emulation.pipeline import Pipeline
 from volref.emulation.textures.gradient_volume import has_gradient_volume, unpacked
-from volref.oracle.intervals.finding import Finder, Reach, classified, classified_2d, value_at
+from volref.oracle.intervals.finding import Finder, Reach, classified, classified_2d
+from volref.oracle.intervals.values import value_at
+from volref.scene.lights import Material
 from volref.scene.transform import transform_points
 from volref.stages.gradients import in_world, length_and_direction
 from volref.stages.lighting import lit_colors
@@ -103,8 +105,6 @@ def _light(
     arriving_total = np.zeros(points.shape[1])
     shine_on = np.zeros_like(points)
     if lit.lights is None:
-        from volref.scene.lights import Material
-
         # Highlights have the colour of the light, whatever they lie on: black shows them alone.
         lights, matter = scene.lights, scene.material or Material()
         shine_on = lit_colors(lights, matter, points, normals, viewer, np.zeros_like(points))
@@ -117,8 +117,6 @@ def _light(
             light = light + arriving * answered(lit.lights.material, normals, towards, viewer)
             arriving_total += np.max(arriving, axis=0)
     if material is None:
-        from volref.scene.lights import Material
-
         material = Material()
     shine = 0.0 if material.model == "lambert" else material.specular
     power = material.shininess * (4 if material.model == "blinn-phong" else 1)

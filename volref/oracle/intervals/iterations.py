@@ -10,9 +10,9 @@ import numpy as np
 
 from volref.arrays import Booleans, Floats, Indices
 from volref.oracle.intervals import gradients
-from volref.oracle.intervals.finding import find
 from volref.oracle.intervals.gradients import Lit
 from volref.oracle.intervals.opacities import Share, share_of
+from volref.oracle.intervals.samples import find
 from volref.oracle.intervals.walking import (
     Course,
     Pair,

@@ -159,8 +159,13 @@ def place_of(course: Course, walk: Walk, number: int) -> tuple[Floats, Floats, P
     delta = paths.delta
     kind = delta.dtype.type
     position = entry + delta * (kind(number) + middle).astype(delta.dtype)
-    # A place on the machine's own line, a known distance behind its entry.
-    radius = walks.path_off + paths.texture_step * half + 8 * unit
+    # A place on the machine's own line, a known distance behind its entry: but for roundings, those of the
+    # step's length among them.
+    radius = walks.path_off + paths.texture_step * half + 6 * unit + 2 * course.finder.slack.division
+    if stepping.rule in ("count", "voxel-count"):
+        # A share of the way to its exit, which may be another share if the number of steps is another.
+        other = number * walks.count_off / np.maximum(paths.count, 1)
+        radius = radius + walks.exit_off + paths.texture_step * other
     return position, radius, part
 
 

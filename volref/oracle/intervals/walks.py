@@ -44,12 +44,15 @@ def walks_of(rays: Rays, drawing: Drawing, slack: Slack) -> Walks:
         paths = paths_of(rays.ends, drawing.scene, drawing.pipeline, drawing.box, drawing.device)
         ray = np.linalg.norm((rays.ends.exit - rays.ends.entry).astype(np.float64), axis=0)
         off = rays.entry_off + rays.exit_off
-        # Of a ray of length L the direction is off by its ends' errors over L, and by some roundings.
-        relative = np.where(ray > 0, 1.7321 * off / ray, 1.0) + 5 * unit + slack.division
+        # Of a ray of length L the direction is off by its ends' errors over L, and by some roundings: those of
+        # squares and their sum (half as much in the root), of a root, a division and a product.
+        relative = np.where(ray > 0, 1.7321 * off / ray, 1.0) + 4 * unit + 2 * slack.division
         step = np.abs(paths.delta).max(axis=0).astype(np.float64)
         zero, count_off = np.zeros_like(ray), np.zeros(len(ray), np.int64)
         if stepping.rule == "count":
-            delta_off = off / stepping.steps + (unit + slack.division) * step * (off != 0)
+            # Ends that are known, as bytes are, are divided alike where divisions are rounded correctly.
+            alike = (off == 0) & (drawing.device.freedom == "rounded")
+            delta_off = off / stepping.steps + (unit + slack.division) * step * ~alike
             length_off = zero
             step_off = zero + slack.division * paths.step * (drawing.device.freedom == "khronos")
         elif stepping.rule == "voxel-count":
