@@ -159,14 +159,21 @@ def place_of(course: Course, walk: Walk, number: int) -> tuple[Floats, Floats, P
     delta = paths.delta
     kind = delta.dtype.type
     position = entry + delta * (kind(number) + middle).astype(delta.dtype)
-    # A place on the machine's own line, a known distance behind its entry: but for roundings, those of the
-    # step's length among them.
-    radius = walks.path_off + paths.texture_step * half + 6 * unit + 2 * course.finder.slack.division
-    if stepping.rule in ("count", "voxel-count"):
-        # A share of the way to its exit, which may be another share if the number of steps is another.
+    radius = _path_off(course, walks, number) + paths.texture_step * half
+    return position, radius + 6 * unit + 2 * course.finder.slack.division, part
+
+
+def _path_off(course: Course, walks: Walks, number: int) -> Floats:
+    """Return how far (n,) the beginning of step `number` may be off, but for the roundings of its making."""
+    paths, rule = walks.paths, course.drawing.pipeline.stepping.rule
+    if course.rays.ends.along is not None:
+        return np.asarray(walks.path_off + number * walks.delta_off)
+    if rule in ("count", "voxel-count"):
+        # A share of the way to the exit, another one where the number of steps may be another.
         other = number * walks.count_off / np.maximum(paths.count, 1)
-        radius = radius + walks.exit_off + paths.texture_step * other
-    return position, radius, part
+        return np.asarray(np.maximum(walks.entry_off, walks.exit_off) + paths.texture_step * other)
+    # A place on the machine's own line, a known distance behind its entry.
+    return walks.path_off
 
 
 def _half_width(low: Floats, high: Floats, unit: float) -> Floats:
