@@ -31,6 +31,14 @@ def test_a_loaded_bundle_has_the_images_of_emulate_and_the_intervals_of_accept(b
     assert all(np.array_equal(loaded.passes[name], target) for name, target in drawn.passes.items())
 
 
+def test_a_bundle_of_a_machine_of_half_floats_is_read_back(tmp_path):
+    subject = tiny("texture3d", "mediump")
+    loaded = vr.load_bundle(written(tmp_path / "a", subject, derived=True))
+    drawn = vr.emulate(subject.scene, subject.pipeline, subject.device).rgba
+    assert drawn.dtype == np.float16
+    assert np.array_equal(loaded.acceptance.nominal, drawn)
+
+
 def test_scene_program_and_device_come_back(bundle):
     loaded, subject = vr.load_bundle(bundle), tiny()
     assert (loaded.name, loaded.title) == ("tiny", "A few pixels")

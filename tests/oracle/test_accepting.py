@@ -184,6 +184,13 @@ def test_the_width_falls_with_what_a_machine_leaves_open():
     assert widths[3] < 0.7 * widths[4]
 
 
+@pytest.mark.parametrize("values", ["float32", "float16"])
+def test_intervals_of_a_machine_of_narrow_numbers_are_read_back_from_their_file(values, tmp_path):
+    made = vr.accept(shown("texture3d"), "texture3d", vr.Device("narrow", values=values))
+    vr.save_acceptance(made, tmp_path / "a.npz")
+    assert np.array_equal(vr.load_acceptance(tmp_path / "a.npz").nominal, made.nominal)
+
+
 def test_levels_of_a_table_are_refused_as_nothing_bounds_them():
     pipeline = vr.pipelines()["barbagallo"].with_switches(table={"filter": "linear-mipmap"})
     with pytest.raises(

@@ -172,9 +172,9 @@ def _write_passes(part: Path, drawn: Emulation) -> list[dict[str, str]]:
 
 def _write_drawn(part: Path, drawn: Emulation) -> dict[str, Any]:
     (part / "expected").mkdir()
-    arrays = {"nominal": drawn.rgba}
+    arrays = {"nominal": drawn.rgba.astype(np.float64)}
     if np.isfinite(drawn.distance).any():
-        arrays["distance"] = drawn.distance
+        arrays["distance"] = drawn.distance.astype(np.float64)
     preview = "expected/preview.png"
     write_png(part / preview, drawn.rgba8)
     return _write_arrays(part, arrays) | {"preview": preview}

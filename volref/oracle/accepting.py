@@ -84,7 +84,7 @@ def accept(
     return Acceptance(
         low,
         high,
-        nominal.rgba,
+        nominal.rgba.astype(np.float64),
         raw_low,
         raw_high,
         marked,
