@@ -45,6 +45,12 @@ def test_a_canvas_inside_its_intervals_passes_in_whatever_floats_it_is_delivered
     assert vr.check(numbers, acceptance, alpha=alpha, encoding=encoding).status == "inside"
 
 
+def test_every_code_passes_as_the_float_that_shaders_read_it_as():
+    codes = np.repeat(np.arange(256, dtype=np.uint8).reshape(16, 16, 1), 4, axis=2)
+    exact = acceptance_of(codes / 255, codes / 255)
+    assert vr.check(codes * np.float32(1 / 255), exact).status == "inside"
+
+
 @given(SEEDS, st.sampled_from(ENCODINGS))
 def test_colours_above_alpha_pass_whether_a_tool_holds_them_to_1_or_not(seed, encoding):
     canvas = byte_intervals(seed)[0]

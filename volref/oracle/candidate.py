@@ -21,8 +21,9 @@ ImageSource: TypeAlias = ArrayLike | Path
 # Colour types of PNG without alpha: grey and RGB.
 WITHOUT_ALPHA = (0, 2)
 
-# Whatever type an image is kept in, shaders computed it in float32: half a unit in the last place of that.
-SHADER_ROUNDING = 2.0**-24
+# Whatever type an image is kept in, shaders computed it in float32: a code times the rounded 1 / 255, as GPUs
+# read it, is rounded twice, each time by up to 2^-24.
+SHADER_ROUNDING = 2.0**-23
 
 
 @dataclass(frozen=True, eq=False)

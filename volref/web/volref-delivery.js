@@ -34,7 +34,7 @@ const ENCODINGS = ["srgb", "gamma2.2", "none"];
 const FREE = 1e30;
 
 // Why these: volref/oracle/candidate.py and delivery.py.
-const ROUNDING = 2 ** -24;
+const ROUNDING = 2 ** -23;
 const CONVERSION_ROUNDING = 8 * 2 ** -23;
 const OWN_ROUNDING = 2 ** -48;
 
