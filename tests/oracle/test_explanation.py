@@ -208,6 +208,13 @@ def test_faults_with_a_name_that_there_is_not_are_refused():
         explained(image_of(one), one, faults=["O9-none"])
 
 
+def test_intervals_of_another_size_are_refused():
+    one = subject(BASELINE)
+    small = vr.Acceptance.unjustified(np.zeros((2, 3, 4), np.uint8), 0.1)
+    with pytest.raises(SceneError, match=f"must be of {WIDTH} x {HEIGHT} pixels .* got 3 x 2"):
+        explained(np.full((2, 3, 4), 200, np.uint8), one, acceptance=small)
+
+
 def test_faults_that_the_program_cannot_have_explain_nothing():
     one = subject(BASELINE, scene(), MACHINE)
     image = image_of(with_faults(one, ("G4-flip-x", 1.0)))

@@ -167,6 +167,10 @@ def explain(
         program = named(pipeline) if isinstance(pipeline, str) else pipeline
     size = frames, scene.height, scene.width
     offsets = None if jitter is None else checked_jitter(jitter, size)
+    if acceptance is not None and acceptance.lo.shape[:2] != size[1:]:
+        height, width = acceptance.lo.shape[:2]
+        message = f"acceptance must be of {scene.width} x {scene.height} pixels as the scene, got "
+        raise SceneError(message + f"{width} x {height}; accept this scene, or leave it out")
     subject = Subject(scene, program, machine, offsets, frames)
     tried = _chosen(faults)
     intervals = accept(scene, program, machine, jitter, frames) if acceptance is None else acceptance
