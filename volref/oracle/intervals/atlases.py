@@ -97,7 +97,7 @@ def _fetched_sides(
         for u, v in zip(pair[3::2], pair[4::2], strict=True)
     ]
     share_off = radius * nz + 2 * finder.slack.control * nz
-    return sides, pair.share.astype(np.float64), share_off
+    return sides, np.nan_to_num(pair.share.astype(np.float64)), share_off
 
 
 def _between(

@@ -119,6 +119,8 @@ def _looked_up(
     """Yield iterations with what their samples may add."""
     position = np.concatenate([one.position for one in placed], axis=1)
     radius = np.concatenate([one.radius for one in placed])
+    # A ray without a direction is nowhere, and so anywhere in the box.
+    radius = np.where(radius <= 1, radius, 1.0)
     ray = np.concatenate([one.ray for one in placed])
     part = _joined_parts([one.part for one in placed])
     skipped = course.drawing.pipeline.stepping.skipped

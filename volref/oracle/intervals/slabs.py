@@ -139,10 +139,15 @@ def cuts_of(lines: Lines, slack: Slack, until: tuple[Floats, Floats] | None = No
             np.nan_to_num(first, nan=-1e30, neginf=-1e30),
             np.nan_to_num(last, nan=1e30, posinf=1e30),
         )
+        first_high, last_low = first + first_off, last - last_off
+        # Between two faces a line all but along them meets neither nearer than this, whichever its sign.
+        away = (np.minimum(o, 1 - o) - do - unit) / (np.abs(d) + dd) * (1 - slack.division)
+        along_faces = (np.abs(d) <= 2 * dd) & (away > 0)
+        first_high, last_low = np.where(along_faces, -away, first_high), np.where(along_faces, away, last_low)
         begin, begin_low, begin_high = (
-            np.maximum(bound.max(axis=0), 0.0) for bound in (first, first - first_off, first + first_off)
+            np.maximum(bound.max(axis=0), 0.0) for bound in (first, first - first_off, first_high)
         )
-        end, end_low, end_high = (bound.min(axis=0) for bound in (last, last - last_off, last + last_off))
+        end, end_low, end_high = (bound.min(axis=0) for bound in (last, last_low, last + last_off))
         if until is not None:
             t, off = until
             end, end_low, end_high = (
