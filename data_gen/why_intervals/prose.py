@@ -39,7 +39,7 @@ picture is its red, green and blue. They are listed below.
 
 - **Golden**: what a project would keep; here each scene drawn in ideal arithmetic, in 8 bits.
 
-- **Faults**: {faults} of volref's table of faults, bugs that real renderers have had, each at one
+- **Faults**: {faults} of the [table of faults](faults.md), bugs that real renderers have had, each at one
 strength, such as half a voxel. They are drawn as `swiftshader` would, the software implementation that
 headless Chromium comes with. A fault *shows* where it moves a byte of the same machine's picture by
 {visible} or more; {hidden} more images have one that does not. A rule has *caught* a fault where it
