@@ -3,7 +3,7 @@
 P pixels; a ray is o + t d in texture space.  o, d and their errors are (3, P).  A face at f is met at
 t = (f - o) / d, which is off by
 
-    dt = (do + c (|f - o|) + |t| dd) / |d| + c' |t|
+    dt = (do + c (|f - o|) + |t| dd) / (|d| - dd) + c' |t|
 
 with the relative errors c of a sum and c' of a division; the entry is the greatest of three such t, the exit
 the least.
@@ -127,10 +127,16 @@ def cuts_of(lines: Lines, slack: Slack, until: tuple[Floats, Floats] | None = No
     unit = slack.control
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         faces = []
+        # A line that may be along a face may meet it anywhere.
+        least = np.maximum(np.abs(d) - dd, 0.0)
         for face in (0.0, 1.0):
             t = (face - o) / d
-            off = (do + unit * np.abs(face - o) + np.abs(t) * dd) / np.abs(d) + slack.division * np.abs(t)
+            off = (do + unit * np.abs(face - o) + np.abs(t) * dd) / least + slack.division * np.abs(t)
             faces.append((t, np.nan_to_num(off, nan=0.0, posinf=1e30)))
+        # A line in a face lies inside or outside, which a rounding decides: 1 / 0 has no other answer.
+        in_face = (d == 0) & (np.minimum(np.abs(o), np.abs(1 - o)) <= do) & (unit > 0)
+        if in_face.any():
+            faces = [(np.where(in_face, np.nan, t), np.where(in_face, 0.0, off)) for t, off in faces]
         (low, low_off), (high, high_off) = faces
         swapped = high < low
         first, first_off = np.where(swapped, high, low), np.where(swapped, high_off, low_off)
@@ -140,10 +146,10 @@ def cuts_of(lines: Lines, slack: Slack, until: tuple[Floats, Floats] | None = No
             np.nan_to_num(last, nan=1e30, posinf=1e30),
         )
         first_high, last_low = first + first_off, last - last_off
-        # Between two faces a line all but along them meets neither nearer than this, whichever its sign.
+        # Between two faces a line meets neither nearer than this, also one all but along them.
         away = (np.minimum(o, 1 - o) - do - unit) / (np.abs(d) + dd) * (1 - slack.division)
-        along_faces = (np.abs(d) <= 2 * dd) & (away > 0)
-        first_high, last_low = np.where(along_faces, -away, first_high), np.where(along_faces, away, last_low)
+        first_high = np.where(away > 0, np.minimum(first_high, -away), first_high)
+        last_low = np.where(away > 0, np.maximum(last_low, away), last_low)
         begin, begin_low, begin_high = (
             np.maximum(bound.max(axis=0), 0.0) for bound in (first, first - first_off, first_high)
         )
@@ -155,7 +161,7 @@ def cuts_of(lines: Lines, slack: Slack, until: tuple[Floats, Floats] | None = No
                 np.minimum(end_low, t - off),
                 np.minimum(end_high, t + off),
             )
-        sure, maybe = begin_high < end_low, begin_low < end_high
+        sure, maybe = (begin_high < end_low) & ~in_face.any(axis=0), begin_low < end_high
         ends = []
         for t, t_low, t_high in ((begin, begin_low, begin_high), (end, end_low, end_high)):
             off = np.maximum(t_high - t, t - t_low)
