@@ -44,7 +44,7 @@ def walks_of(rays: Rays, drawing: Drawing, slack: Slack) -> Walks:
         paths = paths_of(rays.ends, drawing.scene, drawing.pipeline, drawing.box, drawing.device)
         ray = np.linalg.norm((rays.ends.exit - rays.ends.entry).astype(np.float64), axis=0)
         off = rays.entry_off + rays.exit_off
-        # Of a ray of length L the direction is off by its ends' errors over L, and by some roundings: those of
+        # Of a ray of length L the direction is off by its ends' errors over L, and by roundings: those of
         # squares and their sum (half as much in the root), of a root, a division and a product.
         relative = np.where(ray > 0, 1.7321 * off / ray, 1.0) + 4 * unit + 2 * slack.division
         step = np.abs(paths.delta).max(axis=0).astype(np.float64)
