@@ -243,16 +243,22 @@ def answered(material: Material, normals: Floats, towards_light: Floats, viewer:
     facing = np.sum(normals * towards_light, axis=0)
     answer = material.ambient + material.diffuse * _cosine(facing, material)
     if material.model != "lambert":
-        power = material.shininess
-        if material.model == "phong":
-            aligned = np.sum((2 * facing * normals - towards_light) * viewer, axis=0)
-        else:
-            halfway = towards_light + viewer
-            aligned = np.sum(normals * halfway, axis=0) / np.sqrt(np.sum(halfway * halfway, axis=0))
-            power *= 4
-        shine = material.specular * _cosine(aligned, material) ** power
+        aligned, power = alignment(material, facing, normals, towards_light, viewer)
+        shine = material.specular * aligned**power
         answer = answer + np.where(np.any(normals != 0, axis=0), shine, 0)
     return np.asarray(answer)
+
+
+def alignment(
+    material: Material, facing: Floats, normals: Floats, towards_light: Floats, viewer: Floats
+) -> tuple[Floats, float]:
+    """Return the cosine (n,) of a highlight, of those that face the light by n . l (n,), and its power."""
+    if material.model == "phong":
+        aligned = np.sum((2 * facing * normals - towards_light) * viewer, axis=0)
+        return _cosine(aligned, material), material.shininess
+    halfway = towards_light + viewer
+    aligned = np.sum(normals * halfway, axis=0) / np.sqrt(np.sum(halfway * halfway, axis=0))
+    return _cosine(aligned, material), 4 * material.shininess
 
 
 def _cosine(cosine: Floats, material: Material) -> Floats:

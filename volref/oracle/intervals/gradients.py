@@ -6,7 +6,7 @@ import numpy as np
 
 from volref.arrays import Floats, Indices
 from volref.emulation.drawing import Drawing
-from volref.emulation.loop.shading import FLAT, Lights, Place, answered, lights_of, place_of
+from volref.emulation.loop.shading import FLAT, Lights, Place, alignment, answered, lights_of, place_of
 from volref.emulation.pipeline import Pipeline
 from volref.emulation.textures.gradient_volume import has_gradient_volume, unpacked
 from volref.oracle.intervals.finding import Finder, Reach, classified, classified_2d
@@ -86,7 +86,6 @@ def _light(
 ) -> tuple[Floats, Floats, Floats]:
     """Return what colours are multiplied by and what is added (3, n), and how far both may be off (n,)."""
     scene, lighting = lit.drawing.scene, finder.textures.pipeline.lighting
-    material = lit.lights.material if lit.lights is not None else scene.material
     points = transform_points(place.points, position.T.astype(np.float64)).T
     gradient, gradient_off, _ = _gradient(finder, position, radius, reach)
     turns = lighting.normals != "untransformed"
@@ -94,7 +93,7 @@ def _light(
     if lighting.normals == "inward":
         normals = -normals
     steepest = float(np.linalg.norm(place.normals[:3, :3], 2)) if turns else 1.0
-    turned = np.where(length > 0, 2 * steepest * gradient_off / np.where(length > 0, length, 1), 2.0)
+    turned = _turned(steepest * gradient_off, length)
     if reach.magnitude is not None and lighting.flat == "ambient":
         flat = reach.magnitude < FLAT
         normals = np.where(flat, 0, normals)
@@ -102,27 +101,56 @@ def _light(
         turned = np.where(np.abs(reach.magnitude - FLAT) <= gradient_off, 2.0, turned)
     turned = np.minimum(turned + OPERATIONS * finder.slack.values, 2.0)
     viewer = place.viewer[:, ray]
-    arriving_total = np.zeros(points.shape[1])
+    off = np.zeros(points.shape[1])
     shine_on = np.zeros_like(points)
     if lit.lights is None:
         # Highlights have the colour of the light, whatever they lie on: black shows them alone.
         lights, matter = scene.lights, scene.material or Material()
         shine_on = lit_colors(lights, matter, points, normals, viewer, np.zeros_like(points))
         light = lit_colors(lights, matter, points, normals, viewer, np.ones_like(points)) - shine_on
-        arriving_total += sum(float(np.max(one.color)) for one in scene.lights if one.kind != "ambient")
+        strongest = sum(float(np.max(one.color)) for one in scene.lights if one.kind != "ambient")
+        power = matter.shininess * (4 if matter.model == "phong" else 1)
+        off = strongest * (matter.diffuse * turned + _steep(matter) * np.minimum(power * turned, 1))
     else:
         light = np.zeros_like(points) + lit.lights.uniform
         for lamp in lit.lights.lamps:
             towards, arriving = lamp.arriving(points)
-            light = light + arriving * answered(lit.lights.material, normals, towards, viewer)
-            arriving_total += np.max(arriving, axis=0)
-    if material is None:
-        material = Material()
-    shine = 0.0 if material.model == "lambert" else material.specular
-    power = material.shininess * (4 if material.model == "blinn-phong" else 1)
-    moved = material.diffuse * np.minimum(turned, 1) + shine * np.minimum(4 * power * turned, 1)
+            matter = lit.lights.material
+            light = light + arriving * answered(matter, normals, towards, viewer)
+            off = off + np.max(arriving, axis=0) * _answer_off(matter, normals, towards, viewer, turned)
     largest = np.abs(light).max(axis=0) + np.abs(shine_on).max(axis=0)
-    return light, shine_on, arriving_total * moved + OPERATIONS * finder.slack.values * (1 + largest)
+    return light, shine_on, off + OPERATIONS * finder.slack.values * (1 + largest)
+
+
+def _turned(off: Floats, length: Floats) -> Floats:
+    """Return how far (n,) the ends of unit vectors are apart of vectors of a length that are off by so much.
+
+    |u / |u| - v / |v|| is at most 2 |u - v| / (|u| + |v|) (Dunkl and Williams 1964), 2 at most.
+    """
+    sum_of_lengths = np.maximum(2 * length - off, off)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.nan_to_num(np.minimum(2 * off / sum_of_lengths, 2.0), nan=2.0)
+
+
+def _steep(material: Material) -> float:
+    return 0.0 if material.model == "lambert" else material.specular
+
+
+def _answer_off(
+    material: Material, normals: Floats, towards: Floats, viewer: Floats, turned: Floats
+) -> Floats:
+    """Return how far (n,) the answer to a light may be off where normals are turned by so much.
+
+    A highlight c^p lies between (c - d)^p and (c + d)^p; Phong's mirrored ray is off by 4 times the normal.
+    """
+    off = material.diffuse * np.minimum(turned, 1.0)
+    if material.model == "lambert":
+        return off
+    facing = np.sum(normals * towards, axis=0)
+    cosine, power = alignment(material, facing, normals, towards, viewer)
+    away = turned * (4.0 if material.model == "phong" else 1.0)
+    least, most = np.maximum(cosine - away, 0.0), np.minimum(np.maximum(cosine, 0.0) + away, 1.0)
+    return np.asarray(off + material.specular * (most**power - np.minimum(least, most) ** power))
 
 
 def _gradient(
