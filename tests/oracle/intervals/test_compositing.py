@@ -190,6 +190,17 @@ def one_sample(rng):
     return step._replace(before=nobody, after=nobody, share=none)
 
 
+def test_sums_that_grow_beyond_all_numbers_may_be_anything(monkeypatch):
+    def grow(*given):
+        low, high, _ = given[3]
+        low[:], high[:] = [[-np.inf, np.nan, -1e300]], [[np.inf, np.nan, np.nan]]
+
+    monkeypatch.setattr(sums, "_run", grow)
+    outcome = summed(SimpleNamespace(rays=SimpleNamespace(pixel=np.arange(3))), None, 3, None)
+    assert (outcome.low <= -1e100).all()
+    assert (outcome.high >= 1e100).all()
+
+
 def test_the_interval_of_one_sample_is_the_hull_of_its_chord_and_not_its_box(monkeypatch):
     rng = np.random.default_rng(10)
     step = one_sample(rng)

@@ -17,6 +17,9 @@ from volref.oracle.intervals.opacities import Share
 from volref.oracle.intervals.walking import Course, Pair, Test, most_iterations, opaque
 from volref.workspace import Workspace
 
+# Intervals of sums that grow beyond all numbers end here, where their squares are still numbers.
+LARGEST = 1e100
+
 
 class Sum(NamedTuple):
     """Colours (C, n) and alpha (n,) between those of two."""
@@ -42,8 +45,8 @@ def summed(course: Course, lit: Lit | None, channels: int, meeting: Meeting | No
     work = Workspace()
     for first in range(0, count, CHUNK):
         _run(course, lit, np.arange(first, min(first + CHUNK, count)), (low, high, ends), meeting, work)
-    missing = ~np.isfinite(low).all(axis=0)
-    low[:, missing], high[:, missing] = np.nan_to_num(low[:, missing]), np.nan_to_num(high[:, missing])
+    low, high = np.nan_to_num(low, nan=-LARGEST), np.nan_to_num(high, nan=LARGEST)
+    low, high = (np.clip(side, -LARGEST, LARGEST) for side in (low, high))
     return Outcome(low, high, np.where(ends > 1, (high - low).max(axis=0), 0.0))
 
 
