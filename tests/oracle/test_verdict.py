@@ -381,6 +381,11 @@ def test_a_tolerance_that_somebody_chose_is_called_unjustified():
         vr.Acceptance.unjustified(image, -1)
 
 
+def test_a_tolerance_around_whole_numbers_of_unknown_range_is_refused():
+    with pytest.raises(vr.errors.SceneError, match="image must be of uint8, uint16 or floats, got int64"):
+        vr.Acceptance.unjustified(np.full((2, 2, 4), 100, np.int64), 0.1)
+
+
 def test_the_cause_comes_after_the_verdict_and_the_verdict_is_plain_data(drawn):
     canvas, acceptance = drawn
     found = vr.check(canvas[:, ::-1], acceptance, cause="the camera is mirrored.")

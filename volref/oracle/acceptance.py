@@ -11,6 +11,7 @@ from volref.arrays import Booleans, Floats, float_array, number, plain_array
 from volref.emulation.device import Device
 from volref.emulation.groups import Output
 from volref.emulation.pipeline import Pipeline
+from volref.errors import SceneError
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,7 +78,7 @@ class Acceptance:
         Raises
         ------
         SceneError
-            If the image is none, or the tolerance is negative.
+            If the image is none, of another type than `check` takes, or the tolerance is negative.
 
         Examples
         --------
@@ -87,6 +88,9 @@ class Acceptance:
         ([50.0, 50.0, 50.0, 50.0], False)
         """
         codes = plain_array("image", image)
+        if codes.dtype.kind != "f" and codes.dtype not in (np.uint8, np.uint16):
+            message = f"image must be of uint8, uint16 or floats, got {codes.dtype}; "
+            raise SceneError(message + "read it from the canvas again")
         unit = codes / np.iinfo(codes.dtype).max if codes.dtype.kind == "u" else codes
         nominal = float_array("image", unit, ("height", "width", 4))
         slack = number("tolerance", tolerance, low=0)
