@@ -90,12 +90,26 @@ def finished(
     off = 24 * slack.values * np.maximum(1.0, np.maximum(np.abs(low), np.abs(high)))
     if output.gamma != 1.0 or output.tone_map != "none":
         off = off + slack.power(1.0)
+    if device.blend == "integer" and output.format == "unorm8":
+        off = off + STEP * _between_alphas(np.array(alphas), output.blend)
     if output.discard_below is None:
         return Pair(low - off, high + off)
     written, seen = np.array(alphas), output.discard_below
     kept, left = (written.max(axis=0) >= seen)[:, None], (written.min(axis=0) < seen)[:, None]
     low, high = (np.where(kept, side, behind) for side in (low - off, high + off))
     return Pair(np.where(left, np.minimum(low, behind), low), np.where(left, np.maximum(high, behind), high))
+
+
+def _between_alphas(alphas: Floats, blend: str) -> Floats:
+    """Return (F, 1) where whole numbers may blend to one more or less than at both ends of their alpha.
+
+    C a + B (255 - a) is a line in a, but each product is rounded, by up to 0.502: so two sums of two are off
+    from the line by less than 2 together, and their difference is a whole number.
+    """
+    if blend not in ("straight", "additive-alpha"):
+        return np.zeros((alphas.shape[1], 1))
+    codes = codes_of(np.clip(alphas, 0.0, 1.0), 8).astype(np.int64)
+    return (np.ptp(codes, axis=0) >= 2).astype(np.float64)[:, None]
 
 
 def _least_straight(outcome: Floats, fragments: Pair, behind: Floats, *, integer: bool) -> Floats:
