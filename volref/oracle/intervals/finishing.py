@@ -109,7 +109,7 @@ def _between_alphas(alphas: Floats, blend: str) -> Floats:
     if blend not in ("straight", "additive-alpha"):
         return np.zeros((alphas.shape[1], 1))
     codes = codes_of(np.clip(alphas, 0.0, 1.0), 8).astype(np.int64)
-    return (np.ptp(codes, axis=0) >= 2).astype(np.float64)[:, None]
+    return np.asarray(np.ptp(codes, axis=0)[:, None] >= 2, np.float64)
 
 
 def _least_straight(outcome: Floats, fragments: Pair, behind: Floats, *, integer: bool) -> Floats:

@@ -97,9 +97,9 @@ def _by_step(
     steepest = np.minimum(0.3679, 1.002 * (1 - left.min(axis=0)) + UNSURE * half)
     spread = spread + np.minimum(steepest * half / np.maximum(low, 1e-300), 1.0) * (half < UNSURE * middle)
     unsure = np.flatnonzero(np.broadcast_to(half >= UNSURE * middle, beside.shape))
-    if len(unsure) and np.size(half) > 1:
-        base = clear[:, unsure]
-        wide = np.abs(base ** low[unsure] - base ** high[unsure]).max(axis=0)
+    if len(unsure):
+        base, (least_share, most_share) = clear[:, unsure], np.broadcast_arrays(low, high, beside)[:2]
+        wide = np.abs(base ** least_share[unsure] - base ** most_share[unsure]).max(axis=0)
         spread[unsure] += wide
     bend = np.abs(table[1] - table[0]) * np.abs(middle - 1)
     curved = np.abs(left[1] - left[0]) * np.minimum(bend / np.maximum(4 * least, 1e-300), 1.0)
