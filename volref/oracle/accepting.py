@@ -90,7 +90,7 @@ def accept(
         marked,
         drawn,
         causes,
-        advice_for(program, machine),
+        advice_for(program, machine, _typical(raw_high - raw_low, drawn)),
         program,
         machine,
         count,
@@ -130,6 +130,11 @@ def _canvas(drawing: Drawing, offsets: Floats, free: float) -> tuple[Pair, Pair,
         return canvas, frame.canvas, cast_, ambiguous, branch
     last = shown(drawing, mean, slack, scene)
     return rounded(last, output.format, device, blends=False), last, cast_, ambiguous, branch
+
+
+def _typical(width: Floats, drawn: Booleans) -> float:
+    """Return the median width of intervals (H, W, 4), of the widest channel of drawn pixels."""
+    return float(np.median(width.max(axis=-1)[drawn])) if drawn.any() else 0.0
 
 
 def _causes(canvas: Pair, raw: Pair, branch: Floats) -> dict[str, Floats]:

@@ -16,12 +16,22 @@ from volref.scene.scene import Scene
 COARSE = 2.0**-5
 
 
-def advice_for(pipeline: Pipeline, device: Device) -> str:
-    """Return why intervals are of no use, "" where they are."""
+# Intervals of half of the pixels that are wider than this, what half a voxel of shift moves the most, say
+# little: a fault as large as that may lie inside.
+WIDE = 23 / 255
+
+
+def advice_for(pipeline: Pipeline, device: Device, typical: float) -> str:
+    """Return why intervals are of no use, "" where they are; `typical` is their median width."""
     if device.snap_slack and pipeline.rays.kind == "coordinates" and pipeline.rays.format == "unorm8":
         return (
             "vertices are snapped to an unknown grid, and coordinates are stored in 8 bits: most rays may be "
             "another one; find the grid with: volref probe, and accept the device that it writes"
+        )
+    if device.freedom == "khronos" and typical > WIDE:
+        return (
+            f"half of the pixels may differ by {255 * typical:.0f}/255 or more between machines of "
+            f"{device.name!r}; find out what this one does with: volref probe, and accept what it writes"
         )
     return ""
 

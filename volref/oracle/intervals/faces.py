@@ -16,6 +16,9 @@ from volref.scene.camera import Camera
 from volref.scene.scene import Scene
 from volref.scene.transform import transform_points
 
+# How far from the middle, in half viewports, an edge may be cut.
+BAND = 2.0
+
 # A byte's codes.
 MOST = 255.0
 
@@ -32,16 +35,13 @@ def window_error(drawing: Drawing, slack: Slack) -> float:
     points = np.concatenate([box, *(mesh.vertices for mesh in scene.meshes)])
     homogeneous = np.concatenate([points, np.ones((len(points), 1))], axis=1)
     clip, size = homogeneous @ matrix.T, np.abs(homogeneous) @ np.abs(matrix).T
-    seen = clip[:, 3] > 0
-    if not seen.any():
-        return 0.0
-    clip, size = clip[seen], size[seen]
-    ndc = clip[:, :2] / clip[:, 3:]
-    on_screen = np.abs(ndc).max(axis=1) < 2
-    if not on_screen.any():
-        return 0.0
-    error = 9 * slack.control * (size[:, :2] + np.abs(ndc) * size[:, 3:]) / clip[:, 3:] + 4 * slack.control
-    pixels = error[on_screen] * np.array([scene.width, scene.height]) / 2
+    # Edges to corners beside the screen, or behind the eye, are cut before they are drawn: at the guard band,
+    # and at the near plane.
+    w = np.maximum(clip[:, 3:], scene.camera.near if not scene.camera.is_parallel else 1.0)
+    ndc = np.abs(clip[:, :2]) / w
+    share = np.minimum(1.0, BAND / np.maximum(ndc, BAND))
+    error = 9 * slack.control * (share * size[:, :2] + np.minimum(ndc, BAND) * size[:, 3:]) / w
+    pixels = (error + 4 * slack.control) * np.array([scene.width, scene.height]) / 2
     return float(pixels.max())
 
 
