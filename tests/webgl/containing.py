@@ -76,7 +76,8 @@ class Contained:
         )
 
     def percentile(self, percent: float) -> float:
-        return float(np.percentile(self.widths, percent)) if len(self.widths) else 0.0
+        # Without bounds a width is infinite: between two of them nothing is to be interpolated.
+        return float(np.percentile(self.widths, percent, method="higher")) if len(self.widths) else 0.0
 
 
 def contained(opened: Engine | None, case: Case, device: str) -> Contained:
@@ -139,7 +140,7 @@ def widths(ones: list[tuple[Case, Contained]]) -> Iterator[str]:
     floats = [one for case, one in ones if case.format == "float" and len(one.widths)]
     together = np.concatenate([one.widths for one in floats])
     for percent in (50, 99):
-        yield f"{np.percentile(together, percent):.3f}"
+        yield f"{np.percentile(together, percent, method='higher'):.3f}"
     yield f"{max(one.percentile(99) for one in floats):.3f}"
     yield f"{max(one.ambiguous for one in floats):.2%}"
 

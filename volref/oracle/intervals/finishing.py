@@ -87,8 +87,10 @@ def finished(
         outcomes.append(_least_straight(outcomes[0], fragments, behind, integer=device.blend == "integer"))
     stacked = np.array(outcomes)
     low, high = np.fmin.reduce(stacked), np.fmax.reduce(stacked)
-    off = 24 * slack.values * np.maximum(1.0, np.maximum(np.abs(low), np.abs(high)))
-    if output.gamma != 1.0 or output.tone_map != "none":
+    # Of what is not squeezed yet nothing is off by more than its own size, and that of what lies behind.
+    size = np.maximum(np.abs(low), np.abs(high)) + np.abs(behind)
+    off = 24 * slack.values * (np.maximum(size, 1.0) if mapped else size)
+    if mapped and (output.gamma != 1.0 or output.tone_map != "none"):
         off = off + slack.power(1.0)
     if device.blend == "integer" and output.format == "unorm8":
         off = off + STEP * _between_alphas(np.array(alphas), output.blend)
