@@ -40,6 +40,13 @@ def moved(place, radius, rng):
     return place.astype(np.float64) + way * radius
 
 
+def near_borders(place, radius, texture, rng):
+    """Places, a third of their coordinates moved to within a radius of a texel's middle or border."""
+    sizes = np.array(texture.sizes)[:, None]
+    border = np.rint(2 * place * sizes) / 2 / sizes + rng.uniform(-1, 1, place.shape) * radius
+    return np.where(rng.random(place.shape) < 1 / 3, border, place)
+
+
 def fetch_with_other_weights(texture, place, by, rng):
     """A linear fetch whose weights (one for each axis and point) are off by up to `by`, point by point."""
     sizes = np.array(texture.sizes, np.float64)[:, None]
@@ -67,8 +74,8 @@ def fetch_with_other_weights(texture, place, by, rng):
 def test_a_fetch_from_a_displaced_place_lies_inside(kind, shape, reach, seed):
     rng = np.random.default_rng(seed)
     texture = Texture(codes(shape, rng), **KINDS[kind])
-    place = rng.uniform(-0.1, 1.1, (len(shape) - 1, POINTS))
     radius = np.full(POINTS, reach) * rng.random(POINTS)
+    place = near_borders(rng.uniform(-0.1, 1.1, (len(shape) - 1, POINTS)), radius, texture, rng)
     value, off = fetched(Slopes(texture), place, radius, slack_of(Device.named("exact")), Workspace())
     for _ in range(MOVES):
         found = fetch(texture, moved(place, radius, rng), Workspace())
