@@ -9,8 +9,8 @@ from tests.webgl.containing import FLOATS, contained
 # radars around and above: `python -m tests.webgl.containing` draws all scenes there are.
 SCENES = ("turned", "dense", "full", "mesh through", "lit from near", "edges", "radar storm", "radar uneven")
 
-# Known to be wider, on Mesa, whose 8-bit filters and 16-bit colours are steps.  Lit samples, p99: the next byte
-# of a gradient turns a normal.  A colour of 16 bits that alpha multiplies: p50.
+# Known to be wider, on Mesa, whose 8-bit filters and 16-bit colours are steps:
+# the next byte of a gradient turns a normal (p99); alpha multiplies a colour of 16 bits (p50).
 WIDER = {
     ("llvmpipe", "cej2020"): {"p99": 4.0},
     ("llvmpipe", "cej2020-printed"): {"p99": 4.0},

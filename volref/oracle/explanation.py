@@ -157,8 +157,8 @@ def explain(
     >>> scene = vr.Scene(vr.Volume(values), look, camera, 16, 16)
     >>> stale = vr.pipelines()["texture3d"].with_switches(opacity={"rule": "as-is"})
     >>> why = vr.explain(vr.emulate(scene, stale).rgba8, scene, "texture3d", pairs=False)
-    >>> why.status, why.ranking[0].fault
-    ('explained', 'O1-uncorrected')
+    >>> why.ranking[0].fault, round(why.ranking[0].explained, 2)
+    ('O1-uncorrected', 1.0)
     """
     machine = Device.named(device) if isinstance(device, str) else Device() if device is None else device
     if isinstance(pipeline, Candidates):
